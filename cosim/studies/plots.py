@@ -11,16 +11,17 @@ from cosim.files.picture import Picture, grid
 
 VERMILION, BLUE, GREEN = "#d55e00", "#0072b2", "#009e73"
 ORANGE, SKY, PURPLE = "#e69f00", "#56b4e9", "#aa4499"
-"""Okabe and Ito's colours, which the colour-blind tell apart; a darker purple."""
+"""Okabe and Ito's colours, which the colour-blind can distinguish, but a darker purple."""
 FAINT: dict[str, Any] = {"color": "0.74", "marker": ".", "ms": 4, "lw": 0.0, "zorder": 1}
-"""Style of points that are there to be counted, not to be read."""
+"""Style of background points: many, whose single values do not matter."""
 TIE = "\N{NO-BREAK SPACE}"
+"""Joins a number and its unit while lines are filled."""
 
 
 def headline(figure: Picture, message: str) -> None:
-    """Write the message of a figure above it."""
+    """Write the message of a figure above it, in lines as wide as the figure."""
     width = round(10.0 * figure.get_figwidth())
-    tied = re.sub(r"(?<=\d) (?=[^\W\d]|%)", TIE, message)  # a number and its unit
+    tied = re.sub(r"(?<=\d) (?=[^\W\d]|%)", TIE, message)  # between a number and its unit
     lines = "\n".join(fill(line, width) for line in tied.splitlines())
     figure.suptitle(lines.replace(TIE, " "), x=0.01, ha="left", fontsize=12, fontweight="bold")
 
@@ -55,6 +56,6 @@ def panels(
 
 def keep_ticks_inside(*axes: Axis) -> None:
     """Drop the ticks beyond the ends of these x or y axes."""
-    for one in axes:
-        low, high = one.get_view_interval()
-        one.set_ticks([tick for tick in one.get_ticklocs() if low <= tick <= high])
+    for axis in axes:
+        low, high = axis.get_view_interval()
+        axis.set_ticks([tick for tick in axis.get_ticklocs() if low <= tick <= high])

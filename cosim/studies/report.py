@@ -1,4 +1,4 @@
-"""What a study tells: rows, sentences, tables and figures, and how they are written."""
+"""The report of a study: rows, sentences, tables and figures, and how they are written."""
 
 import csv
 import os
@@ -19,39 +19,39 @@ if TYPE_CHECKING:
     from cosim.files.picture import Picture
 
 Row = dict[str, Any]
-"""Cells by their column; all rows of a table have the same ones."""
+"""The cells of a row by their columns; all rows of a table have the same columns."""
 
 Progress = Callable[[int, int, str], object]
-"""Is told how many steps of a study are done, of how many, and which one was the last."""
+"""Called with the number of steps done, their total, and the name of the last one."""
 
 
 def counted(progress: Progress, total: int) -> Callable[..., object]:
-    """What is to be called, with a name or without, as each of ``total`` steps is done."""
+    """A function to be called, with a name or without, after each of ``total`` steps."""
     steps = count(1)
     return lambda what="": progress(next(steps), total, what)
 
 
 def silent(done: int, total: int, what: str = "") -> None:
-    """A progress that nobody looks at."""
+    """A Progress that does nothing."""
 
 
 @dataclass(frozen=True, repr=False)
 class Report:
-    """What a study has found; printed it says that in words."""
+    """The results of a study; its ``repr`` is a text for the terminal."""
 
     name: str
-    """Of its files, without an ending."""
+    """Name of its files, without an ending."""
     title: str
     rows: Sequence[Row]
-    """All that was found, with every digit: a table's rows, units in the names of the columns."""
+    """The rows of the CSV, with every digit; units stand in the names of the columns."""
     sentences: Sequence[str]
-    """Paragraphs that say what it means, the most important first."""
+    """Paragraphs of the page that explain the results, the most important first."""
     tables: Mapping[str, Sequence[Row]]
-    """What a page shows of it, by heading."""
+    """The tables of the page, by heading."""
     figures: Mapping[str, Callable[[], "Picture"]] = field(default_factory=dict)
-    """What draws each figure, by what its file's name has after the report's."""
+    """Functions that draw the figures; a key is what the file's name has after the report's."""
     printed: str = ""
-    """What is printed; the first sentence unless told otherwise."""
+    """The text for the terminal; by default the first sentence."""
 
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Write the rows as CSV, a page of Markdown and the figures. Raises BadInput where the
@@ -72,7 +72,7 @@ class Report:
 
 
 def machine() -> dict[str, Any]:
-    """The computer and the versions of what ran on it."""
+    """The computer and the versions of the programs that ran on it."""
     found: dict[str, Any] = {"processor": _processor(), "cores": os.cpu_count()}
     found |= {"system": f"{platform.system()} {platform.machine()}"} | versions()
     for package in ("scipy", "scikit-sundae"):
@@ -120,19 +120,19 @@ def markdown(rows: Sequence[Row]) -> list[str]:
 
 
 def brief(number: float) -> str:
-    """Two digits, as in a sentence; a dash for what is not known."""
+    """A number with two significant digits, as in a sentence; a dash if it is not finite."""
     if not isfinite(number):
         return "-"
     return f"{number:.0f}" if 10.0 <= abs(number) < 1e5 else f"{number:.2g}"
 
 
 def span(numbers: Collection[float]) -> str:
-    """Least and greatest, in words; one number where they are the same."""
+    """Least and greatest number, in words; one number where both look the same."""
     return " to ".join(dict.fromkeys((brief(min(numbers)), brief(max(numbers)))))
 
 
 def _short(cell: Any) -> str:
-    """Four digits of a number, a dash for what is not known."""
+    """A cell's text: four significant digits of a float, a dash for NaN, infinity and None."""
     if isinstance(cell, float):
         return f"{cell:.4g}" if isfinite(cell) else "-"
     return "-" if cell is None else str(cell)

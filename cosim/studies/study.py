@@ -1,8 +1,8 @@
-"""What a study is: declared once, it is a command, a function of the library, and their reference.
+"""The declaration of a study, from which its command, library function and reference are made.
 
 The ``__init__.py`` of a study's folder declares it in ``STUDIES``, and imports nothing that takes
-time: ``cosim --help`` and ``import cosim`` read all of them. So functions are named, as
-``module.function`` below this package, and loaded when they are needed.
+time: ``cosim --help`` and ``import cosim`` read all declarations. So these only name functions, as
+``module.function`` below this package, which are imported when they are needed.
 """
 
 from collections.abc import Callable, Mapping
@@ -20,35 +20,35 @@ _PACKAGE = __name__.rpartition(".")[0]
 
 
 def loaded(name: str) -> Callable[..., Any]:
-    """The function of that name, ``module.function`` below this package."""
+    """The function ``name``, given as ``module.function`` below this package."""
     module, _, function = name.rpartition(".")
     return getattr(import_module(f"{_PACKAGE}.{module}"), function)
 
 
 @dataclass(frozen=True)
 class Option:
-    """An option of a command; what is given becomes an argument of the function behind it."""
+    """An option of a command; its value becomes an argument of the study's function."""
 
     name: str
-    """As it is typed, ``--seed``; of an argument that stands by its place, the parameter's."""
+    """The option as it is typed, ``--seed``; for a positional argument the parameter's name."""
     help: str
     metavar: str | None = None
-    """What stands for its value; a unit where it has one."""
+    """Placeholder of the value in the help; a unit where it has one."""
     kind: Callable[[str], Any] = str
-    """Makes the value of what is typed; ``bool`` of its name alone, False for ``--no-…``."""
+    """Converts the typed text. ``bool``: a flag without a value, False for ``--no-…``."""
     default: Any = None
-    """The function's own where nothing is given, as the help says it; None: said in ``help``."""
+    """The function's default value, which the help shows; None if ``help`` describes it."""
     parameter: str = ""
-    """The function's, where it has another name."""
+    """Name of the function's parameter, where it is not the option's."""
     many: Literal["", "repeat", "optional", "any"] = ""
-    """A list, by repeating the option, or of any number of words; or one word that may be left
-    out."""
+    """"repeat": a list, by repeating the option; "any": a list of any number of words;
+    "optional": one word that may be left out."""
     choices: tuple[str, ...] = ()
     needed: bool = False
     read: str = ""
-    """Names what makes the argument of the value, a list where ``many``; it raises BadInput."""
+    """Function that makes the argument of the value (a list where ``many``); raises BadInput."""
     prints: str = ""
-    """Names what makes a text: the option prints that, and nothing else is done."""
+    """Function that makes a text: with the option only this is printed, and the study not run."""
 
     @property
     def argument(self) -> str:
@@ -66,7 +66,7 @@ SEED = Option("--seed", "of the search", "N", int, 0)
 
 
 def check_seed(seed: int) -> None:
-    """Refuse what NumPy makes no generator of."""
+    """Raise BadInput for a seed of which NumPy makes no generator."""
     if not (isinstance(seed, Integral) and seed >= 0):
         raise BadInput(f"--seed {plain(seed)}: must be a whole number from 0.")
 
@@ -91,20 +91,20 @@ def quick(help: str) -> Option:
 
 
 Told = Callable[..., tuple[int | None, int | None, str]]
-"""Makes of what a function tells as it goes on: steps done (None: one more), of how many (None: as
-before), and words on the last one."""
+"""Converts the arguments of a progress callback to the progress bar's: steps done (None: one more),
+their total (None: unchanged), and words on the last one."""
 
 
 @dataclass(frozen=True)
 class Study:
-    """A study as the user asks for it.
+    """A study as a command and a library function.
 
-    Its function takes what the options give, ``out`` where it ``saves``, and what it ``tells``; it
-    returns a result that has ``save``, or a report or several of them.
+    Its function takes the arguments of the options, ``out`` where it ``saves``, and the callbacks
+    of ``tells``; it returns a result that has ``save``, or one or several reports.
     """
 
     home: str
-    """Names its function, whose own name is that in the library."""
+    """Its function, as for :func:`loaded`; the last part is its name in the library."""
     help: str = ""
     options: tuple[Option, ...] = ()
     command: str = ""
@@ -112,22 +112,22 @@ class Study:
     library: bool = True
     """Whether it is one of the library's functions."""
     out: str = ""
-    """Where the command writes unless told otherwise; ``<scene>`` stands for the scene's name."""
+    """The command's default folder; ``<scene>`` stands for the scene's name."""
     saves: bool = True
-    """The function writes into ``out`` as it goes on; else what it returns is saved."""
+    """Whether the function itself writes into ``out``; else the command saves its result."""
     writes: str = ""
-    """The files besides figures, in words; empty for reports, which tell their own."""
+    """The files besides figures, in words; empty for reports, which name their own."""
     figures: tuple[str, ...] = ()
     unit: str = "step"
-    """Of the progress bar."""
+    """Unit of the progress bar."""
     total: str = ""
-    """The option that says how many steps there are, where the function does not tell it."""
+    """The option with the number of steps, where the callbacks do not have it."""
     tells: Mapping[str, Told] = field(default_factory=dict)
-    """What it calls as it goes on, by parameter, and what that means."""
+    """The function's progress callbacks, by parameter."""
     told: str = ""
-    """Names what makes the text to print of a result; its ``repr`` unless told otherwise."""
+    """Function that makes the printed text of a result; by default its ``repr``."""
     check: str = ""
-    """Names what raises SimulationFailed where a result, told and saved, is none."""
+    """Function that raises SimulationFailed for a useless result, printed and saved before."""
 
     @property
     def module(self) -> str:
@@ -146,7 +146,7 @@ class Study:
 def chart(
     home: str, help: str, *options: Option, library: bool = True, saves: bool = True
 ) -> Study:
-    """A study that gives reports, and tells steps done, of how many, and which was the last."""
+    """A study that returns reports, with a callback ``progress`` that is a report's Progress."""
     tells: dict[str, Told] = {"progress": lambda done, total, what="": (done, total, what)}
     command = f"chart {home.rpartition('.')[2]}"
     return Study(home, help, options, command, library, "results", saves, tells=tells)
@@ -155,6 +155,6 @@ def chart(
 @cache
 def studies() -> tuple[Study, ...]:
     """All studies that a folder beside this file declares, by name."""
-    folders = (one.name for one in iter_modules([str(Path(__file__).parent)]) if one.ispkg)
-    found = (one for name in folders for one in import_module(f"{_PACKAGE}.{name}").STUDIES)
+    folders = (x.name for x in iter_modules([str(Path(__file__).parent)]) if x.ispkg)
+    found = (study for name in folders for study in import_module(f"{_PACKAGE}.{name}").STUDIES)
     return tuple(sorted(found, key=lambda study: study.name))

@@ -1,4 +1,4 @@
-"""Simulated against measured: one trial, and all that were published."""
+"""Simulated against measured: one trial, or all published ones."""
 
 from pathlib import Path
 

@@ -1,8 +1,8 @@
-"""Simulated against measured: a run and a recording, seen by the same instruments.
+"""Simulated against measured: a run and a recording, read by the same instruments.
 
-Simulated heights are read at the recording's times, exposed as its camera does and differenced as
-its tracker does; velocities, currents and voltages that were measured by themselves are read as
-they are. Only then are they laid over the measured ones.
+Simulated heights are averaged over the camera's exposure at the recording's times, and velocities
+are the tracker's differences of these. Where a recording has velocities without heights, currents
+or voltages, the simulated ones are interpolated at its times. The signals are compared afterwards.
 """
 
 from collections.abc import Iterator, Mapping
@@ -29,29 +29,30 @@ from cosim.trials.recording import Recording
 from cosim.waveforms.columns import COLUMNS
 
 SHIFTS = 400
-"""Phases that are tried within a period, before the best one is refined."""
+"""Start times that are tried within a period, before the best one is refined."""
 
 GUIDES = ("v_surface", "current", "coil_voltage", "command", "v_part")
-"""The first of these that was measured tells the period, and where in it the run is laid over."""
+"""The first of these that was measured is the guide: it gives the period and the run's phase."""
 
 PHASES = 101
-"""Of a period, at which hints are looked for."""
+"""Number of start times, over one period, at which hints are tested."""
 
 DIGITS = 6e-7, 6e-12
-"""Relative, and m: of the heights of an exported trial."""
+"""Rounding of the heights of an exported trial: relative, and absolute in m."""
 
 LEAST_ROWS = 8
-"""Of a recording that a run must cover."""
+"""Rows of a recording that a run must cover."""
 
 APART = 0.05
-"""Of a period by which run and recording may drift apart before their frequencies differ."""
+"""Share of a period by which run and recording may drift apart before a note says so."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """A run laid over a recording, from ``start`` (s) of the run on.
+    """A run compared with a recording whose first row is at ``start`` (s) of the run.
 
-    ``recording`` is what was compared, ``simulated`` has its signals; scores lead ``numbers``.
+    ``recording`` has the compared rows and signals, ``simulated`` the run's at the same times; the
+    scores come first in ``numbers``.
     """
 
     recording: Recording
@@ -64,14 +65,14 @@ class Found:
 @dataclass(frozen=True, eq=False)
 class Seen:
     """A run (its waveforms, SI) as a recording's instruments show it; ``exposure`` of a frame, s.
-    A start is the time (s) of the run at which it meets the recording's first row."""
+    In all methods ``start`` is the time of the run, s, at the recording's first row."""
 
     waveforms: Mapping[str, Array]
     recording: Recording
     exposure: float
 
     def signal(self, name: str, start: float) -> Array:
-        """A signal at the recording's times."""
+        """The run's signal ``name`` at the recording's times."""
         at, (quantity, _, body) = self.recording.time + start, name.partition("_")
         if f"z_{body}" not in self.recording.signals:
             return np.interp(at, self.waveforms["time"], self.waveforms[name])
@@ -79,8 +80,8 @@ class Seen:
         return z if quantity == "z" else velocities(at, z)
 
     def is_own(self, start: float) -> bool:
-        """Whether the heights are this run's, to the digits of an exported trial: seven, and eight
-        places of a millimetre. A recording without heights is no trial."""
+        """Whether the recording is a trial that was exported from this run: its heights agree to
+        the digits of the file, seven, and eight places of a millimetre. False without heights."""
         at, signals = self.recording.time + start, self.recording.signals
         names = [name for name in ("z_surface", "z_part") if name in signals]
         if not names or at[-1] > self.waveforms["time"][-1] + 1e-9:
@@ -90,13 +91,13 @@ class Seen:
         return all(np.allclose(run, seen, *DIGITS) for run, seen in pairs)
 
     def best_start(self, guide: str, earliest: float, latest: float) -> float:
-        """The start at which the run explains most of the guiding signal."""
+        """The start at which the run explains most of the variance of the signal ``guide``."""
         wanted = self.recording.signals[guide]
 
         def missed(start: float) -> float:
             return -explained(self.signal(guide, start), wanted)
 
-        # Within a period the share has several maxima: all are looked at before one is climbed.
+        # Within a period R² has several maxima: the best of a grid is refined.
         starts = np.linspace(earliest, latest, SHIFTS)
         best = int(np.argmin([missed(float(start)) for start in starts]))
         around = starts[max(best - 1, 0)], starts[min(best + 1, SHIFTS - 1)]
@@ -104,8 +105,8 @@ class Seen:
         return min((float(starts[best]), float(finer.x)), key=missed)
 
     def camera_errors(self, start: float) -> list[Number]:
-        """Mean distances of the run's rows from the straight lines between the frames, as scripts
-        that interpolate a trial draw them."""
+        """Mean distances between the run's rows and linear interpolation of the recording's frames,
+        as scripts that interpolate a trial see it."""
         found, time, signals = [], self.waveforms["time"], self.recording.signals
         for signal, name, unit, scale, words in (
             ("z_surface", "camera_surface_mm", "mm", 1e3, "height of the surface"),
@@ -133,12 +134,12 @@ def measure(
     shutter: float = 0.0,
     aligned: bool = False,
 ) -> Found:
-    """Scores and numbers, and both sides at the recording's times.
+    """Scores and numbers, and the signals of both sides at the recording's times.
 
-    ``earliest`` is the first time of the run that may be laid over the recording's first row, s;
-    ``period`` that of the drive, s, within which it is shifted for the best agreement, or None
-    where there is nothing to shift; ``shutter`` the exposure as a share of the time between rows.
-    A run that is ``aligned`` is not shifted.
+    ``earliest`` is the first time of the run, s, that may correspond to the recording's first row.
+    From there the run is shifted by up to the drive's ``period``, s, for the best agreement; not if
+    that is None, or if the run is ``aligned``. ``shutter`` is the exposure as a share of the time
+    between rows.
     """
     recording, notes = _comparable(recording, waveforms)
     row = float(np.median(np.diff(recording.time)))
@@ -160,7 +161,7 @@ def measure(
             f"The run ends at {end:.4g} s, too early to cover the {rows} rows of "
             f"{plain(recording.name)}: run.duration must be at least {needed:.4g} s."
         )
-    guide, repeats = _period(recording, period)
+    guide, repeats = _period(recording, period)  # ``repeats``: the measured period, s
     start = earliest
     if guide and period is not None and not own and not aligned:
         start = seen.best_start(guide, earliest, max(earliest, min(end - span, earliest + period)))
@@ -168,13 +169,13 @@ def measure(
     notes += _of_periods(repeats, period, span, row)
     if not own and guide:
         phases = np.linspace(-0.5, 0.5, 0 if aligned or period is None else PHASES)
-        others = start + phases * (period or 0.0)
-        others = others[(others >= 0.0) & (others + span <= end)]
+        starts = start + phases * (period or 0.0)
+        starts = starts[(starts >= 0.0) & (starts + span <= end)]
 
         def shown(at: Recording, name: str, first: float) -> Array:
             return Seen(waveforms, at, 0.0).signal(name, first)
 
-        notes += hints(recording, shown, guide, np.concatenate([[start], others]))
+        notes += hints(recording, shown, guide, np.concatenate([[start], starts]))
     numbers = [
         *scores(recording, simulated, repeats),
         *both_sides(recording, simulated, (repeats, period or repeats)),
@@ -206,7 +207,7 @@ def _of_periods(
             f"driven at {1.0 / period:.4g} Hz (drive.frequency). At the end of the recording they "
             f"are {apart:.2g} periods apart, which spoils the scores."
         )
-        power = round(np.log10(period / repeats))  # milliseconds that were taken for seconds
+        power = round(np.log10(period / repeats))  # such as milliseconds taken for seconds
         if power and abs(period / repeats / 10.0**power - 1.0) < APART:
             yield f"Hint: with times multiplied by {10.0**power:g} they would not differ."
     if period and span < period:
@@ -219,24 +220,25 @@ def _of_periods(
 def _comparable(
     recording: Recording, waveforms: Mapping[str, Array]
 ) -> tuple[Recording, list[str]]:
-    """The recording with those of its signals that the run has, and its notes."""
+    """The recording without signals that the run lacks, and notes. Raises BadInput where none is
+    left, or one is constant."""
     notes, name = list(recording.notes), plain(recording.name)
-    kept = {name: values for name, values in recording.signals.items() if name in waveforms}
-    others = ", ".join(COLUMNS[one].text for one in recording.signals if one not in kept)
-    if not kept:
-        raise BadInput(f"{name}: the run has no {others} to compare it with.")
-    if others:
-        notes.append(f"Left out, since the run has none: {others}.")
-    for signal, values in kept.items():
+    common = {name: values for name, values in recording.signals.items() if name in waveforms}
+    missing = ", ".join(COLUMNS[x].text for x in recording.signals if x not in common)
+    if not common:
+        raise BadInput(f"{name}: the run has no {missing} to compare it with.")
+    if missing:
+        notes.append(f"Left out, since the run has none: {missing}.")
+    for signal, values in common.items():
         if np.ptp(values[np.isfinite(values)]) == 0.0:
             words = f"the {COLUMNS[signal].text} does not change"
             raise BadInput(f"{name}: {words}: there is nothing to compare.")
-    return replace(recording, signals=kept), notes
+    return replace(recording, signals=common), notes
 
 
 def _covered(recording: Recording, length: float) -> Recording:
-    """What a run of this length (s) covers, from the first row whose velocity is known: with that
-    begins a run whose surface is a recording's."""
+    """The rows that a run of this length (s) covers, from the first row with a known velocity of
+    the surface: there begins a run that has its surface's motion from a recording."""
     v = recording.signals.get("v_surface")
     first = 0 if v is None else int(np.argmax(np.isfinite(v)))
     time = recording.time - recording.time[first]
@@ -244,7 +246,7 @@ def _covered(recording: Recording, length: float) -> Recording:
 
 
 def _period(recording: Recording, hint: float | None) -> tuple[str, float | None]:
-    """The first guide, "" where there is none, and the first period (s) that one tells."""
+    """The first measured guide, or "", and the first period, s, that a guide has, or None."""
     guides = [name for name in GUIDES if name in recording.signals]
     found = (period_of(recording.time, recording.signals[name], hint) for name in guides)
     return next(iter(guides), ""), next(filter(None, found), None)

@@ -1,5 +1,5 @@
-"""The trials of a folder, each against the built-in scene with its number: how far the whole chain,
-from the command to the part, can be trusted."""
+"""The trials of a folder, each compared with the built-in scene of its number: the accuracy of the
+whole chain from the command to the part."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -52,15 +52,15 @@ COLUMNS: dict[str, tuple[str, float]] = {
     "kick [mm/s]": ("kick_simulated", 1e3),
     "measured kick [mm/s]": ("kick_measured", 1e3),
 }
-"""What is told of each trial: names of ``Comparison.numbers``, and the factor from their units."""
+"""The table's columns: the name in ``Comparison.numbers`` and the factor to the column's unit."""
 
 
 def trials(
     trials: Path, overrides: Overrides | None = None, *, progress: Progress = silent
 ) -> Report:
-    """Compare the published trials of a folder with their scenes: how well one machine repeats
-    them. Raises BadInput."""
-    rows = [_row(one) for one in each(trials, overrides, progress)]
+    """Compare the published trials of a folder with their scenes: how well a single machine model
+    reproduces them all. Raises BadInput."""
+    rows = [_row(comparison) for comparison in each(trials, overrides, progress)]
     said, tables, figures = [message(rows), *NOTES], {"Trials": rows}, {"": partial(draw, rows)}
     return Report("trials", "The whole chain against the trials", rows, said, tables, figures)
 
@@ -68,8 +68,8 @@ def trials(
 def _row(found: Comparison) -> Row:
     """A trial's row of the table."""
     numbers = {name: nan if x is None else x for name, x in found.numbers.items()}
-    told = {title: scale * numbers.get(name, nan) for title, (name, scale) in COLUMNS.items()}
-    return {"scene": found.run, **told}
+    cells = {title: scale * numbers.get(name, nan) for title, (name, scale) in COLUMNS.items()}
+    return {"scene": found.run, **cells}
 
 
 NOTES = (
@@ -87,14 +87,15 @@ NOTES = (
 
 
 def message(rows: Sequence[Row]) -> str:
-    """What the table shows, in a sentence."""
-    shares = [one["surface's velocity: R²"] for one in rows]
-    centred, its_line, first, line = [*COLUMNS][4:8]
+    """The result in a sentence."""
+    shares = [row["surface's velocity: R²"] for row in rows]
+    centred, centred_line, first, first_line = [*COLUMNS][4:8]
+    # In how many trials the simulation is closer to the part's path than a straight line.
     closer, from_first = (
-        sum(one[error] < one[of_line] for one in rows)
-        for error, of_line in ((centred, its_line), (first, line))
+        sum(row[error] < row[of_line] for row in rows)
+        for error, of_line in ((centred, centred_line), (first, first_line))
     )
-    apart = [abs(one["drift [mm/s]"] - one["measured drift [mm/s]"]) for one in rows]
+    apart = [abs(row["drift [mm/s]"] - row["measured drift [mm/s]"]) for row in rows]
     return (
         f"Over {len(rows)} trials the chain from the command to the part explains "
         f"{min(shares):.2f} to {max(shares):.2f} of the variance of the surface's velocity, "
@@ -106,7 +107,7 @@ def message(rows: Sequence[Row]) -> str:
 
 
 def draw(rows: Sequence[Row]) -> Picture:
-    """Draw the explained shares, the part's errors and its drifts, a bar a trial."""
+    """Draw R² of the surface, errors and drifts of the part, with a bar for each trial."""
     figure, (shares, errors, drifts) = panels(
         message(rows),
         "Bars: simulated by the whole chain. Marks: what the measurements give for comparison.",
@@ -120,17 +121,17 @@ def draw(rows: Sequence[Row]) -> Picture:
         (errors, centred, line, centred[0].upper() + centred[1:], "best straight line"),
         (drifts, "drift [mm/s]", "measured drift [mm/s]", speed, "measured"),
     ):
-        axis.bar(at, [one[bars] for one in rows], 0.6, color=BLUE, label="simulated")
-        values = [one[marks] for one in rows]
+        axis.bar(at, [row[bars] for row in rows], 0.6, color=BLUE, label="simulated")
+        values = [row[marks] for row in rows]
         axis.plot(at, values, color=VERMILION, ls="", marker="_", ms=18, mew=2.5, label=label)
-        axis.set_xticks(at, [one["scene"].removeprefix("trial-").lstrip("0") for one in rows])
+        axis.set_xticks(at, [row["scene"].removeprefix("trial-").lstrip("0") for row in rows])
         axis.set_xlabel("trial")
         axis.margins(y=0.25)
         axis.legend(fontsize=8, ncols=2, loc="upper left")
         axis.set_title(title, loc="left", fontsize=10.5)
-    values = [one[from_first] for one in rows]
+    values = [row[from_first] for row in rows]
     errors.plot(at, values, "k.", label="from the first frame (the paper's)")
     errors.margins(y=0.5)
     errors.legend(fontsize=8, loc="upper left")
-    shares.set_ylim(min(0.0, *(one[first] for one in rows)), 1.25)
+    shares.set_ylim(min(0.0, *(row[first] for row in rows)), 1.25)
     return figure

@@ -1,4 +1,4 @@
-"""The figure of a comparison: every measured signal with the run's, over time."""
+"""The figure of a comparison: every measured signal and the simulated one, over time."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,9 +17,10 @@ PANELS = (
     (("z_part", PART), ("v_part", PART)),
     (("command", DRIVE), ("current", DRIVE), ("coil_voltage", DRIVE)),
 )
-"""Signals and colours, column by column."""
+"""Signals and colours of the panels, column by column."""
 
 SCALED = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s")}
+"""Units that a panel shows in another one: the factor and the shown unit."""
 
 
 def draw(title: str, found: Found) -> Picture:
@@ -44,7 +45,7 @@ def draw(title: str, found: Found) -> Picture:
 
 
 def _message(found: Found) -> str:
-    """How far the run repeats what was measured."""
+    """In words, the first R² of the comparison and the error of the part's mean velocity."""
     numbers = {number.name: number.value for number in found.numbers}
     said = [
         f"explains {_share(share)} of the variance of the {words}"
@@ -80,16 +81,16 @@ WORDS = {
     "z_part": ("mean_error_mm", "mean error from the first row {:.3f} mm", " (ceiling {:.3f})")
 }
 WORDS |= {name: (score, "R² {:.2f}", " (ceiling {:.2f})") for name, (score, _) in R2.items()}
-"""Of a panel's score, and of its ceiling."""
+"""For a panel's signal: its score, and the words for its value and for its ceiling."""
 BOTH = {
     "z_part": ("drift", "mean velocity {:+.1f} mm/s (measured {:+.1f})"),
     "v_surface": ("kick", "largest change {:.0f} mm/s (measured {:.0f})"),
 }
-"""What both sides say of a panel's signal."""
+"""For a panel's signal: a number that both sides have, and the words for it, in mm/s."""
 
 
 def _words(name: str, found: Found) -> str:
-    """The scores of a panel, and what both sides say of it."""
+    """A panel's title: the score of its signal, and the number that both sides have."""
     numbers = {number.name: number.value for number in found.numbers}
     said = []
     if name in WORDS:

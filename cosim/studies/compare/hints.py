@@ -1,8 +1,8 @@
-"""What a user may have written wrong in a recording's file: told, never applied.
+"""Hints at errors in a recording's file. They are printed, never applied.
 
 Each guess is one change of the file: a power of ten, a sign, exchanged columns, a velocity in the
-place of a height, a part measured from the surface or at another time, a clock. It is worth a
-sentence where it leaves at most half of what the run does not explain without it.
+place of a height, a part measured from the surface or at another time, a wrong frame rate. A guess
+becomes a hint if it at least halves the variance that the run does not explain.
 """
 
 from collections.abc import Callable, Iterator
@@ -17,12 +17,13 @@ from cosim.trials.camera import velocities
 from cosim.trials.recording import Recording
 from cosim.waveforms.columns import COLUMNS
 
+# Of a column: powers of ten, and both signs.
 FACTORS = [sign * 10.0**power for power in range(-6, 7) for sign in (1, -1)]
 CLOCKS = np.linspace(0.988, 1.012, 25)
 """Factors of the recording's times."""
 
 ROWS = 4000
-"""Of a recording, as many as are looked at."""
+"""Most rows of a recording that are examined."""
 
 LAGS = range(-12, 13)
 """Rows by which the part's column may be late."""
@@ -35,19 +36,19 @@ Observe = Callable[[Recording, str, float], Array]
 
 
 def hints(recording: Recording, observe: Observe, guide: str, starts: Array) -> Iterator[str]:
-    """A sentence for each guess that explains the misfit. ``starts`` (s) are the times at which the
-    run may meet the first row, the first of them that at which it does; ``guide`` tells which."""
+    """A sentence for each guess that explains the misfit. ``starts`` (s) are times of the run that
+    may correspond to the first row; the first one is in use, chosen by the signal ``guide``."""
     recording = recording.rows(slice(ROWS))
     signals = recording.signals
     laid = [observe(recording, guide, start) for start in starts]
 
     def heights(*bodies: str) -> float:
-        """The lower R² of the heights from their means, where the columns of ``bodies`` are taken
-        for surface and part, and the run meets the first of them best."""
+        """The lower R² of both heights, means removed, with the columns of ``bodies`` taken for
+        surface and part, at the start that agrees best with the first one's velocity."""
         shares = [explained(run, signals[f"v_{bodies[0]}"]) for run in laid]
         first, found = starts[int(np.argmax(shares))], []
-        for body, other in zip(("surface", "part"), bodies, strict=True):
-            run, wanted = observe(recording, f"z_{body}", first), signals[f"z_{other}"]
+        for body, column in zip(("surface", "part"), bodies, strict=True):
+            run, wanted = observe(recording, f"z_{body}", first), signals[f"z_{column}"]
             found.append(explained(run - np.nanmean(run), wanted - np.nanmean(wanted)))
         return min(found)
 
@@ -57,14 +58,16 @@ def hints(recording: Recording, observe: Observe, guide: str, starts: Array) -> 
             agree = _agree("two heights", after, before)
             yield f"{agree} with the columns of surface and part exchanged: which is which?"
             return
-    start, fine = starts[0], True
+    start, fine = starts[0], True  # ``fine``: no guess has explained the misfit yet
     measured = {name: signals[name] for name in (guide, *R2) if name in signals}
-    for z in ("z_surface", "z_part"):  # where a velocity is of another column, so is its unit
+    # Where a height has a column besides the velocity's, it has a unit of its own: its differences
+    # are examined, too.
+    for z in ("z_surface", "z_part"):
         if {z, f"v{z[1:]}"} <= recording.understood.get("columns", {}).keys() & signals.keys():
             measured[z] = velocities(recording.time, signals[z])
     for name, values in measured.items():
-        moves = name.replace("z_", "v_", 1)
-        runs = laid if moves == guide else [observe(recording, moves, start)]
+        velocity = name.replace("z_", "v_", 1)
+        runs = laid if velocity == guide else [observe(recording, velocity, start)]
         shares = {factor: [explained(run, factor * values) for run in runs] for factor in FACTORS}
         factor = max(shares, key=lambda factor: max(shares[factor]))
         before, after = max(shares[1.0]), max(shares[factor])
@@ -76,6 +79,7 @@ def hints(recording: Recording, observe: Observe, guide: str, starts: Array) -> 
         fine = False
         yield sentence
     if fine:
+        # With other times the best start is another one, too, so the nearest 17 are tried.
         near = starts[np.argsort(np.abs(starts - start))[:17]]
         clocks = {}
         for clock in (1.0, *CLOCKS):
@@ -91,8 +95,8 @@ def hints(recording: Recording, observe: Observe, guide: str, starts: Array) -> 
 def _of_other_motion(
     recording: Recording, observe: Observe, laid: list[Array], guide: str, start: float
 ) -> Iterator[str]:
-    """Hints at heights that are something else than they say. ``laid``: the run's ``guide`` as it
-    may meet the recording; ``start`` (s) as in :class:`Seen`."""
+    """Hints at height columns that hold velocities, relative heights or delayed ones. ``laid``: the
+    run's signal ``guide`` for each possible start; ``start`` (s) as in :class:`Seen`."""
     signals, headers = recording.signals, recording.understood.get("columns", {})
     for body in ("surface", "part"):
         z, v = f"z_{body}", f"v_{body}"
@@ -125,6 +129,7 @@ def _of_other_motion(
 
 
 def _better(after: float, before: float) -> bool:
+    """Whether a guess raises R² enough: it halves the unexplained share and reaches WELL."""
     return after >= WELL and 1.0 - after <= 0.5 * (1.0 - before)
 
 

@@ -1,4 +1,4 @@
-"""A run and a recording side by side, as a user asks for it."""
+"""The command and library function that compare a run with a recording."""
 
 import os
 from collections.abc import Mapping
@@ -31,7 +31,7 @@ from cosim.waveforms.storage import write_csv
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A run laid over a recording; ``found`` holds the scores and both sides' signals, SI."""
+    """A run compared with a recording; ``found`` holds the scores and both sides' signals, SI."""
 
     run: str
     trial: str
@@ -39,20 +39,21 @@ class Comparison:
 
     @property
     def numbers(self) -> dict[str, float | None]:
-        """All numbers by name; SI but for ``_mm`` and ``_percent``. A score stands by its own name,
-        and with ``_ceiling``, ``_no_motion`` and ``_straight_line`` for what needs no model."""
+        """All numbers by name; SI but for ``_mm`` and ``_percent``. A score's bare name is the
+        run's; with ``_ceiling``, ``_no_motion`` and ``_straight_line`` it is that of a reference that
+        needs no model."""
         return {number.name: number.value for number in self.found.numbers}
 
     def plot(self) -> Picture:
-        """Every signal that was measured, over time, and simulated."""
+        """Every measured signal and the simulated one, over time."""
         return figure.draw(f"{self.run} against {self.trial}", self.found)
 
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Write ``compare.json``, ``compare.csv``, ``frames.csv`` and ``compare.png``."""
         out = Path(folder)
         about = {"understood": self.found.recording.understood, "notes": self.found.notes}
-        told = {"run": self.run, "trial": self.trial, **self.numbers, **about}
-        write_json(out / "compare.json", told)
+        content = {"run": self.run, "trial": self.trial, **self.numbers, **about}
+        write_json(out / "compare.json", content)
         write_rows(out / "compare.csv", [asdict(number) for number in self.found.numbers])
         recording, simulated = self.found.recording, self.found.simulated
         table, units = {"time": recording.time}, {"time": "s"}
@@ -70,15 +71,15 @@ class Comparison:
 
 
 FEWEST_ROWS = 2.1
-"""In a period of the run."""
+"""Fewest rows of a recording in a period of the run: a little above the two of Nyquist's limit."""
 
 TABLES = (
     {end: end.replace("_", " ").strip() or "run" for end in LINES},
     {"_measured": "measured", "_simulated": "simulated"},
     {"": "value"},
 )
-"""What the names of the numbers in a row end with, and the heads of their columns; the last table
-takes all that are left."""
+"""For each printed table: its columns' heads, by the ends of the names of their numbers. The last
+table takes all numbers that are left."""
 
 LEGEND = (
     "ceiling: the measured motion's forecast of itself one period later",
@@ -88,8 +89,8 @@ LEGEND = (
 
 
 def _table(numbers: dict[str, Number], ends: Mapping[str, str]) -> list[str]:
-    """A table of those that have all these ends, which are taken out, in the units of the bench,
-    and what its rows mean."""
+    """A table with a row for each name that ``numbers`` has with all ``ends``, in the units of the
+    bench, and the meanings of the rows. Removes these numbers from ``numbers``."""
     rows: list[Row] = []
     meanings: list[str] = []
     first = next(iter(ends))
@@ -97,7 +98,7 @@ def _table(numbers: dict[str, Number], ends: Mapping[str, str]) -> list[str]:
         if all(name + end in numbers for end in ends):
             found = [numbers.pop(name + end) for end in ends]
             unit, scale = bench_unit(found[0].unit)
-            values = [one.value and one.value * scale for one in found]
+            values = [number.value and number.value * scale for number in found]
             rows.append({"": f"{name} [{unit}]", **dict(zip(ends.values(), values, strict=True))})
             meanings.append(f"{name}: {found[0].meaning}")
     return [*markdown(rows), "", *meanings] if rows else []
@@ -111,16 +112,16 @@ def compare(
     columns: str = "",
     aligned: bool = False,
 ) -> Comparison:
-    """Compare a run with a recording (a CSV): a tracked trial, or what any instrument measured of
-    surface, part, current or voltage (:mod:`cosim.trials.table` has the columns and units), or
-    ``columns`` names them: ``"time=t:s,surface=top:mm,part=cube:mm"``. What was understood is
-    printed first; what is not clear is refused.
+    """Compare a run with a recording (a CSV): a tracked trial, or measurements of surface, part,
+    current or voltage by any instrument. :mod:`cosim.trials.table` has the known columns and units;
+    ``columns`` names others: ``"time=t:s,surface=top:mm,part=cube:mm"``. How the file was read is
+    printed first; ambiguous files are refused.
 
     ``run`` is a result, a folder that ``Result.save`` wrote, or a scene, which is then run, with
-    ``overrides`` for its keys, long enough to cover the recording. Where in its period the run
-    meets the first row is chosen so that the surfaces' velocities agree best, or the currents,
-    voltages, or parts' velocities where no surface was measured; a run that is ``aligned`` meets it
-    at ``run.settle``, as the scenes of the trials do, which begin as the records do.
+    ``overrides`` for its keys, long enough to cover the recording. The time of the run at the
+    recording's first row is chosen within a period so that the surfaces' velocities agree best, or
+    the currents, voltages, or parts' velocities where no surface was measured. If ``aligned``, it
+    is ``run.settle``: the scenes of the trials begin there as the records do.
 
     Raises BadInput for files that cannot be read, and for a run that is too short.
     """
@@ -154,6 +155,7 @@ def _run(
         return name, finished, scene
     scene = load(run, overrides)
     period = _check_rate(scene, trial)
+    # One row more than the recording, and a period within which the run may be shifted.
     span = float(trial.time[-1]) * len(trial.time) / (len(trial.time) - 1) + (period or 0.0)
     longer = {"duration": max(scene.run.duration, scene.run.settle + span)}
     if scene.drive.waveform == "file":
@@ -163,8 +165,8 @@ def _run(
 
 
 def _check_rate(scene: Scene, trial: Recording) -> float | None:
-    """The period of a scene, s. Raises BadInput where a trial has too few rows in it, and for a
-    scene with its own FMUs, whose waveforms are none of a recording's."""
+    """The period of a scene, s. Raises BadInput where a trial has too few rows in a period, and for
+    a scene with its own FMUs, whose waveforms cannot be matched to a recording's."""
     if scene.has_ports:
         raise BadInput(
             f"{scene.name}: compare needs the built-in machine, not a scene's own ports."

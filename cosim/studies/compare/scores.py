@@ -1,4 +1,5 @@
-"""What a comparison says: scores beside what needs no model, and the same numbers of both sides."""
+"""The numbers of a comparison: scores beside those of references without a model, and numbers that
+are measured and simulated alike, such as drift and kick."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,8 +21,8 @@ LINES = {
     "_no_motion": "; of nothing that moves",
     "_straight_line": "; of the best straight line",
 }
-"""What a score is given for, the run first: what that adds to its name and to its meaning. No model
-need beat the ceiling; the last two are floors."""
+"""The run and the references for which a score is given: what each adds to the score's name and to
+its meaning. No model need beat the ceiling; the last two are floors."""
 
 Signals = dict[str, Array]
 Distance = Callable[[Array, Array], float]
@@ -29,7 +30,7 @@ Distance = Callable[[Array, Array], float]
 
 @dataclass(frozen=True)
 class Number:
-    """One number of a comparison, with its unit and meaning; None where it cannot be told."""
+    """One number of a comparison, with its unit and meaning; None where it is not known."""
 
     name: str
     value: float | None
@@ -47,13 +48,13 @@ def explained(found: Array, wanted: Array) -> float:
 
 
 def mean_distance(found: Array, wanted: Array) -> float:
-    """Mean of the distances, where both are known; NaN where they never are."""
+    """Mean of |``found`` − ``wanted``| over the rows where both are known; NaN without any."""
     apart = (found - wanted)[np.isfinite(found - wanted)]
     return float(np.abs(apart).mean()) if len(apart) else nan
 
 
 def centred_distance(found: Array, wanted: Array) -> float:
-    """The same of the distances from the mean difference."""
+    """Mean of the differences' distances from their mean: ``mean_distance`` with means removed."""
     apart = (found - wanted)[np.isfinite(found - wanted)]
     return float(np.abs(apart - apart.mean()).mean()) if len(apart) else nan
 
@@ -69,20 +70,21 @@ R2 = {
 
 
 def scores(recording: Recording, simulated: Signals, period: float | None) -> list[Number]:
-    """The scores of all signals, each for all of ``LINES``; ``period`` is the measured one, s."""
+    """The scores of all signals, each for all ``LINES``; ``period`` is the measured one, s."""
     found, time = [], recording.time
 
     def lines(measured: Array, run: Array, gained: float, score: Distance) -> list[float | None]:
-        # In the order of LINES; where the motion does not repeat it has no forecast of itself.
+        # In the order of LINES. The forecast is the measured signal a period before plus its drift
+        # ``gained`` in one; None where the motion does not repeat.
         known = np.isfinite(measured)
         line = np.polynomial.Polynomial.fit(time[known], measured[known], 1)
         later = one_period_later(time, measured, period, gained) if period else None
-        every = run, later, np.zeros(len(time)), line(time)
-        return [None if one is None else _told(score(one, measured)) for one in every]
+        predictions = run, later, np.zeros(len(time)), line(time)
+        return [None if x is None else _known(score(x, measured)) for x in predictions]
 
     def add(name: str, unit: str, meaning: str, values: list[float | None]) -> None:
-        for (line, of), value in zip(LINES.items(), values, strict=True):
-            found.append(Number(f"{name}{line}", value, unit, f"{meaning}{of}"))
+        for (end, words), value in zip(LINES.items(), values, strict=True):
+            found.append(Number(f"{name}{end}", value, unit, f"{meaning}{words}"))
 
     if "z_part" in simulated:
         measured, run = (side["z_part"] for side in (recording.signals, simulated))
@@ -107,15 +109,15 @@ def scores(recording: Recording, simulated: Signals, period: float | None) -> li
     return found
 
 
-def _told(value: float) -> float | None:
-    """None where nothing was known to make it of."""
+def _known(value: float) -> float | None:
+    """The value, or None for NaN and infinity, for which there were no data."""
     return value if isfinite(value) else None
 
 
 def both_sides(
     recording: Recording, simulated: Signals, periods: tuple[float | None, float | None]
 ) -> list[Number]:
-    """Numbers of the measured signals and of the run's; ``periods`` are those of both, s."""
+    """Numbers of the measured and of the simulated signals; ``periods`` are those of both, s."""
     time, found = recording.time, []
     sides = (("measured", recording.signals), ("simulated", simulated))
 
@@ -141,19 +143,21 @@ def both_sides(
         words = "share of the rows in which part and surface differ by more than 10 mm/s"
         pair("slip_fraction", "1", words, [*shares])
     if "v_surface" in simulated:
-        # Rows may lie closer: what happens between two of them would depend on how close.
+        # Changes are taken over one frame of the trials' camera, since a change between two rows
+        # would depend on the recording's rate.
         apart = max(1, round(1.0 / FRAME_RATE / float(np.median(np.diff(time)))))
         apart = min(apart, len(time) // 2)
         velocities = [signals["v_surface"] for _, signals in sides]
         changes = [np.abs(v[apart:] - v[:-apart]) for v in velocities]
-        # fmax leaves out what is not known; where nothing is, the start is left, which is no kick.
-        kicks = [_told(float(np.fmax.reduce(each, initial=-np.inf))) for each in changes]
+        # fmax ignores NaN; where all are NaN, −inf remains, which becomes None.
+        kicks = [_known(float(np.fmax.reduce(each, initial=-np.inf))) for each in changes]
         words = f"largest change of the surface's velocity in {time[apart] * 1e3:.3g} ms"
         pair("kick", "m/s", f"{words}: what impacts show", [*kicks])
     return found
 
 
 def _slipping(signals: Signals) -> float | None:
+    """The share of the rows in which part and surface differ by more than STICKS."""
     apart = np.abs(signals["v_part"] - signals["v_surface"])
     known = apart[np.isfinite(apart)]
     return float(np.mean(known > STICKS)) if len(known) else None

@@ -1,8 +1,8 @@
-"""The paper's misprints, each with a proof that is computed when it is asked for.
+"""The paper's misprints, each with a proof that is computed at each call.
 
-The proofs use none of the closed forms: they follow a part on a vibrating surface from event to
+The proofs use none of the closed forms: they simulate a part on a vibrating surface from event to
 event. In the paper's units: f = F_n/(m_P g), A = a_max/g, times in periods, accelerations in g,
-velocities in g T; µ_s = 0.7 and µ_k = 0.6 as in its figures.
+velocities in g T; µ_s = 0.7 and µ_k = 0.6 as in the paper's figures.
 """
 
 import math
@@ -26,13 +26,13 @@ Surface = tuple[Array, Array]  # times, and velocities that are linear between t
 
 @dataclass(frozen=True)
 class Erratum:
-    """A misprint: what stands there, what should, and what a simulation says."""
+    """A misprint: the printed text, the right one, and the result of a simulation."""
 
     where: str
     printed: str
     right: str
     proof: str
-    numbers: dict[str, float]  # those of the proof
+    numbers: dict[str, float]  # of the proof
     confirmed: bool  # the simulation agrees with ``right`` and not with ``printed``
 
 
@@ -64,6 +64,7 @@ def errata_text() -> str:
 
 
 def _first_phase() -> Erratum:
+    # Durations of the three phases, times their accelerations: velocity that a period gains.
     lengths = np.diff(_cycle(F, A, A, margin=0.0)[0])
     gain, closed = (float(lengths @ (mu * F - 1, -A, A)) for mu in (MU_K, MU_S))
     moved = _moved(_cycle(F, A, A), F)
@@ -173,21 +174,24 @@ def _growth() -> Erratum:
 
 
 def _cycle(f: float, fall: float, rise: float, margin: float = ROUNDING_MARGIN) -> Surface:
-    """Three phases, at µ_s f − 1, −``fall`` and +``rise``, that bring velocity and height back.
+    """A surface with three phases, at µ_s f − 1, −``fall`` and +``rise``, that ends at the velocity
+    and height at which it begins.
 
-    What the part gains in the first one while it sticks it loses in the others; with a ``margin``
-    it sticks below the limit and meets the surface after the end, in spite of rounding.
+    The velocity that the part gains in the first phase, while it sticks, it loses in the others by
+    sliding at −(µ_k f + 1). A ``margin`` makes up for rounding: the first acceleration stays below
+    the limit of sticking, and the part reaches the surface's velocity only after the period.
     """
     first, slowed = (MU_S - margin * MU_S) * f - 1, MU_K * f + 1
-    stick = slowed / (first + slowed) + margin
+    stick = slowed / (first + slowed) + margin  # duration of the first phase
     falling = (rise * (1 - stick) + first * stick) / (fall + rise)
     times = np.array([0.0, stick, stick + falling, 1.0])
     velocities = np.array([0.0, first * stick, first * stick - fall * falling, 0.0])
-    return times, velocities - np.trapezoid(velocities, times)
+    return times, velocities - np.trapezoid(velocities, times)  # so that the mean velocity is 0
 
 
 def _third_period(surface: Surface, f: float) -> PartMotion:
-    """The part's motion, which starts with the surface's velocity; four knots a period."""
+    """The part's motion in three periods, starting with the surface's velocity. The surface has
+    three phases, so rows −4 to −1 are the knots of the last period."""
     return exact(*surface, mu_s=MU_S, mu_k=MU_K, force_per_mass=f, gravity=1.0, periods=3)
 
 
@@ -204,16 +208,16 @@ def _stuck(surface: Surface, f: float) -> float:
 
 
 def _moved_sliding(f: float) -> float:
-    """The mean velocity, g T, of a part that offers no more than kinetic friction once it is not
-    pushed up."""
+    """The mean velocity, g T, of a part that is carried up in the first phase, and has no more than
+    kinetic friction afterwards (µ_s = µ_k), so that it slides."""
     times, velocities = _cycle(f, A, A, margin=0.0)
-    pushed = times[1] * (velocities[0] + velocities[1]) / 2
+    pushed = times[1] * (velocities[0] + velocities[1]) / 2  # height gained in the first phase
     later = exact(times[1:], velocities[1:], mu_s=MU_K, mu_k=MU_K, force_per_mass=f, gravity=1.0)
     return float(pushed + later.z[-1])
 
 
 def _best_f(peak: float) -> float:
-    """The ratio at which the simulated transport is fastest."""
+    """The ratio f = F_n/(m_P g) at which the simulated transport is fastest, A = ``peak``."""
     from scipy.optimize import minimize_scalar
 
     found: Any = minimize_scalar(

@@ -1,8 +1,8 @@
-"""The paper's figure 7, a part's measured and simulated height, with this project's beside it.
+"""The paper's figure 7, a part's measured and simulated height, with this project's simulation.
 
-The authors give their solver the surface's *tracked* motion and a normal force fitted to the trial.
-The whole machine knows neither: of a trial it has the drive, the start and the normal force of the
-identified scenes, and makes the surface's motion itself.
+The authors' solver has the surface's *tracked* motion and a normal force fitted to the trial. The
+model of the whole machine has neither: it takes a trial's drive and start, and the normal force of
+the identified scenes, and simulates the surface's motion.
 """
 
 from functools import partial
@@ -42,38 +42,38 @@ def paper(trials: Path, *, progress: Progress = silent) -> Report:
     the published ones."""
     theirs = fit(trials, evaluate="published", solver="published").shown
     exact = fit(trials, evaluate="published", solver="exact").shown
-    every = [*zip(theirs, exact, each(trials, progress=progress), strict=True)]
-    rows = [_row(number, *sides) for number, sides in enumerate(every, start=1)]
+    compared = [*zip(theirs, exact, each(trials, progress=progress), strict=True)]
+    rows = [_row(number, *sides) for number, sides in enumerate(compared, start=1)]
     said = (
         "The ten published trials as they were measured, by the authors' solver and by the exact "
         "one on the tracked surface, and by the whole chain from the command to the part."
     )
-    figures = {"": partial(_draw, rows, *every[TRIAL - 1])}
+    figures = {"": partial(_draw, rows, *compared[TRIAL - 1])}
     return Report("figure7", "The paper's figure 7", rows, [said], {"Trials": rows}, figures)
 
 
 def _row(number: int, theirs: Shown, exact: Shown, machine: Comparison) -> Row:
     """A trial's mean velocities of the part over whole periods, mm/s, and mean errors of its
-    height, mm. The machine's height is off by a constant, too, as it does not begin on the part's
-    own. ``theirs`` and ``exact`` begin FIRST_ROW rows after ``machine``."""
+    height, mm. The machine's error includes a constant offset, since its simulation does not start
+    at the measured height. ``theirs`` and ``exact`` begin FIRST_ROW rows after ``machine``."""
     numbers, solved = machine.numbers, {"theirs": theirs, "exact": exact}
     frequency = numbers["frequency_measured"]
     period = 1.0 / frequency if frequency else None
     velocities = {
         "measured": numbers["drift_measured"],
-        **{side: drift(*one.simulated, period) for side, one in solved.items()},
+        **{side: drift(*shown.simulated, period) for side, shown in solved.items()},
         "machine": numbers["drift_simulated"],
     }
     return {
         "trial": number,
         **{f"v_{side} [mm/s]": (v or 0.0) * 1e3 for side, v in velocities.items()},
-        **{f"error_{side} [mm]": one.error * 1e3 for side, one in solved.items()},
+        **{f"error_{side} [mm]": shown.error * 1e3 for side, shown in solved.items()},
         "error_machine [mm]": numbers["mean_error_mm"],
     }
 
 
 def _draw(rows: list[Row], *sides: Any) -> Picture:
-    """All trials, and one of them on all ``sides``."""
+    """The velocities of all trials, and the heights of TRIAL by each of the three ``sides``."""
     figure = Picture(13.0, 5.6, "constrained")
     left, right = figure.subplots(1, 2, width_ratios=(1.5, 1.0))
     _paths(left, rows[TRIAL - 1], *sides)
@@ -95,7 +95,7 @@ def _draw(rows: list[Row], *sides: Any) -> Picture:
 
 
 def _paths(axis: Axes, row: Row, theirs: Shown, exact: Shown, machine: Comparison) -> None:
-    """Heights from the first row that the authors keep."""
+    """Draw heights of TRIAL above, and times after, the first row that the authors use."""
     seen, made = machine.found.recording, machine.found.simulated
     time = (seen.time - seen.time[FIRST_ROW])[FIRST_ROW:]
 

@@ -1,4 +1,4 @@
-"""The paper's figures 3 and 4 from the corrected closed forms, with what it prints beside."""
+"""The paper's figures 3 and 4 from the corrected closed forms, with its printed values marked."""
 
 from collections.abc import Sequence
 
@@ -19,9 +19,9 @@ from cosim.waveforms.figure import PART, STICKING, SURFACE
 GUIDELINE = (4.0, 16.0)
 """The paper's range for µ_s F_n, in weights of the part."""
 CURVES = ("#8d99ae", "#1f6fb2", "#2a9d8f", "#e9a03b")
-DASHED, BEYOND = (0, (5, 2)), (0, (4, 3))
+DASHED, BEYOND = (0, (5, 2)), (0, (4, 3))  # dash patterns: of the part; beyond the limit f_max
 OPTIMA = "line of optima"
-POINTS = 400
+POINTS = 400  # of a drawn curve
 
 
 def draw_cycle(case: Transport) -> Picture:
@@ -57,7 +57,10 @@ def draw_cycle(case: Transport) -> Picture:
 
 
 def _motion(axes: Sequence[Axes], cycle: Cycle, slowed: float, gravity: float) -> None:
-    """Accelerations, velocities, heights; the period's end is its own time, not the next start."""
+    """Draw accelerations, velocities and heights of surface and part over one period.
+
+    The part sticks up to the first knot, and is then slowed at ``slowed``, m/s²: its path is
+    integrated piecewise from the time that it has stuck and the time since then, ``loose``."""
     time, knots = np.linspace(0.0, cycle.times[3], POINTS), cycle.knots()
     first = cycle.accelerations[0]
     loose = np.maximum(time - cycle.times[1], 0.0)
@@ -65,6 +68,7 @@ def _motion(axes: Sequence[Axes], cycle: Cycle, slowed: float, gravity: float) -
     velocity = knots[1][0] + first * stuck + slowed * loose
     height = knots[1][0] * time + first * stuck * (0.5 * stuck + loose)
     height += 0.5 * slowed * loose**2
+    # Both ends of each of the three phases, for step-shaped lines.
     edges = np.repeat(cycle.times, 2)[1:-1]
     accelerations = np.repeat([cycle.accelerations, (first, slowed, slowed)], 2, axis=1) / gravity
     for axis, at, surface, part, name in (
@@ -81,7 +85,7 @@ def draw_velocities(case: Transport, peaks: Sequence[float]) -> Picture:
     """Figure 4: v_ave over the normal force for several a_max, m/s²."""
     figure, (axis,) = grid(1, 1, 9.0, 6.0, 0.0)
     axis.axvspan(*(weight / case.mu_s for weight in GUIDELINE), color=STICKING, alpha=0.45, lw=0)
-    best = [_curve(axis, case, *one) for one in zip(peaks, CURVES, strict=False)]
+    best = [_curve(axis, case, *pair) for pair in zip(peaks, CURVES, strict=False)]
     ratios, speeds = optima(case, max(peaks))
     axis.plot(ratios, speeds * 1e3, color="0.15", lw=1.3, ls=DASHED, zorder=2, label=OPTIMA)
     axis.axhline(0.0, color="0.5", lw=0.8, zorder=1)
@@ -122,14 +126,14 @@ def optima(case: Transport, most: float) -> tuple[Array, Array]:
 
 
 def _curve(axis: Axes, case: Transport, peak: float, color: str) -> float:
-    """Draw v_ave for one a_max; gives the best f_n."""
+    """Draw v_ave over f_n for the a_max ``peak``, m/s²; returns the best f_n."""
     mu_s, mu_k, gravity = case.mu_s, case.mu_k, case.gravity
     sticking = formulas.largest_force_ratio(mu_s, peak, gravity)
     sliding = formulas.largest_force_ratio(mu_k, peak, gravity)
     best = formulas.optimal_force_ratio(mu_s, mu_k, peak, gravity)
 
     def speed(f_n: float) -> float:
-        """v_ave, mm/s, with its value 0 at both its ends, where rounding may miss it."""
+        """v_ave, mm/s; exactly 0 at both ends of the range of f_n, in spite of rounding."""
         pair = formulas.horizontal_equivalent(mu_s, mu_k, f_n)
         if pair.static <= 0.0 or pair.kinetic >= peak / gravity:
             return 0.0

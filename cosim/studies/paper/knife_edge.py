@@ -1,8 +1,9 @@
 """How a small error of timing, or of the solver, loses the transport of the optimal waveform.
 
-With the optimal waveform part and surface meet again exactly at the period's end. If they meet a
-little earlier, the surface overtakes the part, which then slips for the whole next phase. A solver
-that finds the end of slipping to within its step, or a velocity threshold, errs so by itself.
+With the optimal waveform the part reaches the surface's velocity exactly at the period's end. If it
+does so a little earlier, the surface becomes faster than the part, which then slips for the whole
+next phase. A solver that locates the end of slipping only to within its step or a velocity
+threshold makes this error by itself.
 """
 
 from collections.abc import Callable
@@ -19,7 +20,7 @@ from cosim.files.picture import grid
 from cosim.mechanics import part
 from cosim.studies.report import write_csv
 
-PERIODS = 20
+PERIODS = 20  # of a simulation; the second half is averaged
 STEP, V_MIN = part.PUBLISHED_STEP, part.PUBLISHED_V_MIN
 
 Method = Callable[..., part.PartMotion]
@@ -30,7 +31,7 @@ METHODS: dict[str, tuple[Method, str, str]] = {
     f"{_NAME}, {STEP * 1e3:g} ms": (partial(_THRESHOLD, step=STEP), "#e9a03b", "-"),
     f"{_NAME}, {STEP * 1e4:g} µs": (partial(_THRESHOLD, step=STEP / 100), "#d1495b", "-"),
 }
-"""Ways to solve, with colours and styles of their curves."""
+"""Solvers, with the colours and line styles of their curves."""
 TIMING, FORCE = "timing error [periods]", "f_n [m_P g]"
 CLOSED_FORM: dict[str, Any] = {"color": "0.2", "alpha": 0.3, "label": "closed form"}
 
@@ -43,7 +44,7 @@ def mistimed(cycle: Cycle, error: float) -> Cycle:
 
 
 def simulated(method: Method, cycle: Cycle, case: Transport) -> float:
-    """Mean velocity of the part, m/s, over the second half of 20 periods."""
+    """Mean velocity of the part, m/s, over the second half of PERIODS."""
     half, end = PERIODS // 2 * case.period, PERIODS * case.period
     motion = method(
         *cycle.knots(),
@@ -52,7 +53,7 @@ def simulated(method: Method, cycle: Cycle, case: Transport) -> float:
         force_per_mass=case.f_n * case.gravity,
         gravity=case.gravity,
         periods=PERIODS,
-        output=np.array([0.0, half, end * (1 - 1e-12)]),
+        output=np.array([0.0, half, end * (1 - 1e-12)]),  # rounding must not put it past the end
     )
     return float(motion.z[2] - motion.z[1]) / (end - half)
 
@@ -65,7 +66,7 @@ def write(out_dir: Path, case: Transport) -> None:
     most = largest_force_ratio(case.mu_s, case.a_max, case.gravity) * 0.99
     ratios = np.linspace(1.05 / case.mu_k, most, 40).tolist()
     pressed = [replace(case, f_n=ratio) for ratio in ratios]
-    theory = [average_velocity(one) for one in pressed]
+    theory = [average_velocity(variant) for variant in pressed]
 
     figure, (left, right) = grid(2, 2, 13.0, 4.8, 0.0)
     left.set_xscale("symlog", linthresh=1e-9, linscale=0.4)
@@ -74,10 +75,10 @@ def write(out_dir: Path, case: Transport) -> None:
     curves = []
     for axis, over, values, cycles in (
         (left, TIMING, errors, [(mistimed(optimum, error), case) for error in errors]),
-        (right, FORCE, ratios, [(optimal_cycle(one, margin=1e-6), one) for one in pressed]),
+        (right, FORCE, ratios, [(optimal_cycle(at, margin=1e-6), at) for at in pressed]),
     ):
         for name, (method, color, style) in METHODS.items():
-            curve = [simulated(method, *one) for one in cycles]
+            curve = [simulated(method, *pair) for pair in cycles]
             curves.append((over, values, name, curve))
             axis.plot(values, np.array(curve) * 1e3, color=color, ls=style, lw=1.4, label=name)
         axis.set_ylabel("mean velocity of the part [mm/s]")

@@ -1,4 +1,4 @@
-"""What the closed forms say of one case, as numbers, as a table and as the paper's two figures."""
+"""The closed forms evaluated for one case, as numbers, a table and the paper's two figures."""
 
 import os
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from cosim.files.picture import Picture
 
 FIGURE_3 = Transport(mu_s=0.7, mu_k=0.6, a_max=98.1, f_n=5.0, period=0.05)
-"""The case of the paper's figure 3, which has 10 g, and tells no period: this one is ours."""
+"""The case of the paper's figure 3 (a_max 10 g); the paper gives no period, this is ours."""
 
 SHARES = (0.5, 1.0, 1.5, 2.0)
 """The largest accelerations of figure 4's curves, in units of the one given."""
@@ -29,7 +29,7 @@ SHARES = (0.5, 1.0, 1.5, 2.0)
 
 @dataclass(frozen=True, repr=False)
 class Theory:
-    """What the closed forms say of a case: ``numbers``, SI, as ``theory.json`` holds them."""
+    """What the closed forms give for a case: ``numbers``, SI, as ``theory.json`` holds them."""
 
     case: Transport
     numbers: dict[str, Any]
@@ -41,8 +41,8 @@ class Theory:
         return figures.draw_cycle(self.case)
 
     def save(self, folder: str | os.PathLike[str]) -> None:
-        """Write ``theory.json``, the paper's figures 3 and 4, and what the optimum costs when it is
-        missed, ``knife_edge.csv`` and ``knife_edge.png``."""
+        """Write ``theory.json``, the paper's figures 3 and 4, and the transport near the optimum,
+        ``knife_edge.csv`` and ``knife_edge.png``."""
         from cosim.studies.paper import figures, knife_edge
 
         out = Path(folder)
@@ -137,6 +137,7 @@ def collect(case: Transport) -> dict[str, Any]:
 
 
 def _told(entry: dict[str, Any]) -> str:
+    """Velocity and stroke of an entry of ``numbers`` in words, or why there is no transport."""
     if "not_possible" in entry:
         return f"none: {entry['not_possible']}"
     return f"{entry['v_average'] * 1e3:+.2f} mm/s, stroke {entry['stroke'] * 1e3:.3f} mm"
@@ -157,7 +158,7 @@ def _cycle(cycle: Cycle, velocity: float, gravity: float) -> dict[str, Any]:
 
 
 def _force(case: Transport, a_max: float) -> dict[str, float]:
-    """The limits of the normal force and its optimum, with another a_max."""
+    """The limits of the normal force and its optimum, with ``a_max`` in place of the case's."""
     mu_s, mu_k, gravity = case.mu_s, case.mu_k, case.gravity
     best = formulas.optimal_force_ratio(mu_s, mu_k, a_max, gravity)
     pair = formulas.horizontal_equivalent(mu_s, mu_k, best)

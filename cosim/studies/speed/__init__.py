@@ -1,4 +1,4 @@
-"""What each circuit model costs: beside its error on scenes, and as ratios on this machine."""
+"""The cost of each circuit model: with its error on scenes, and as speed ratios on this machine."""
 
 from cosim.studies.study import OVERRIDES, Option, Study, chart, quick
 

@@ -1,8 +1,8 @@
-"""``cosim bench``: how fast each rung is, as ratios that are taken side by side in one run.
+"""``cosim bench``: speed ratios of the rungs, measured in turns in one run.
 
-An absolute time means nothing on another machine, so whatever is compared takes turns, and ratios
-are formed round by round: changes of the machine's speed cancel. What errors the rungs have at
-these speeds, ``cosim chart ladder`` and ``accuracy`` tell.
+An absolute time means nothing on another machine. So the compared calls take turns, and ratios are
+formed round by round, in which changes of the machine's speed cancel. The errors of the rungs at
+these speeds are in ``cosim chart ladder`` and ``accuracy``.
 """
 
 import json
@@ -25,10 +25,10 @@ from cosim.toolchain.libraries import compiled
 from cosim.toolchain.processes import in_place
 
 BRIEF_FULL = ("circuit.model=full", "run.duration=0.1", "run.settle=0.05")
-"""Settings that make the scene `reference` short on the rung `full`, thirty times as slow."""
+"""Settings that shorten the scene `reference` for the rung `full`, which is thirty times slower."""
 
 LONG_PART = ("run.duration=100", "run.output_step=1e-2")
-"""So long, and so few rows, that starting and writing rows cost next to nothing."""
+"""Settings of a run so long, with so few rows, that starting and writing cost almost nothing."""
 
 TITLES = {
     "real_time": "Simulated seconds per second of one core",
@@ -36,7 +36,7 @@ TITLES = {
 }
 
 Targets = dict[str, tuple[float, float]]
-"""Least and greatest median of a number, by its dotted name."""
+"""Bounds of the median of a number, by its dotted name."""
 
 TARGETS: Targets = {
     "real_time.amplifier": (3.0, inf),
@@ -48,7 +48,7 @@ TARGETS: Targets = {
 
 @dataclass(frozen=True, repr=False)
 class Bench:
-    """What was measured: ``numbers``, as ``bench.json`` holds them."""
+    """The measured ``numbers``, as ``bench.json`` holds them."""
 
     numbers: dict[str, Any]
 
@@ -65,19 +65,19 @@ def bench(*, quick: bool = False) -> Bench:
 
     A ``quick`` bench takes fewer rounds and shorter runs.
     """
-    with in_place():  # CPU times are those of one process
+    with in_place():  # no child processes: their CPU time would be missing
         return Bench(judged(measure(quick), TARGETS))
 
 
 def measure(quick: bool) -> dict[str, Any]:
-    """All numbers: of each ratio the median over the rounds, ``low`` and ``high``."""
+    """All numbers: each ratio's median, least (``low``) and greatest (``high``) over the rounds."""
     host = {name: machine()[name] for name in ("processor", "cores", "python")}
     host |= {"compiler": compiler_version()}
     return {**real_time(3 if quick else 11), "quick": quick, "machine": host}
 
 
 def compiler_version() -> str:
-    """What made the FMU: the first line that the C compiler says of itself."""
+    """The C compiler that built the FMU: the first line of its version."""
     return json.loads(compiled("build.json").read_text())["compiler"]
 
 
@@ -103,12 +103,12 @@ def real_time(rounds: int) -> dict[str, Any]:
 
 
 def take_turns(calls: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, list[float]]:
-    """CPU seconds of each call in each round, after one round that warms up."""
+    """CPU seconds of each call in each round; a first round, which warms up, is not counted."""
     taken: dict[str, list[float]] = {name: [] for name in calls}
     for turn in range(rounds + 1):
         for name, call in calls.items():
             seconds = cpu(call)
-            if turn:
+            if turn:  # round 0 warms up
                 taken[name].append(seconds)
     return taken
 
@@ -126,7 +126,7 @@ def spread(values: Sequence[float]) -> dict[str, float]:
 
 
 def ratios(over: Sequence[float], under: Sequence[float]) -> dict[str, float]:
-    """The spread of the ratios of two calls, round by round."""
+    """The spread of the ratios ``over``/``under``, formed round by round."""
     return spread([a / b for a, b in zip(over, under, strict=True)])
 
 
@@ -142,7 +142,7 @@ def judged(numbers: dict[str, Any], targets: Targets) -> dict[str, Any]:
 
 
 def table(numbers: dict[str, Any], titles: Mapping[str, str]) -> str:
-    """All numbers for people, a table of each group."""
+    """The printed text: a table for each group of numbers."""
     host = numbers["machine"]
     lines = [f"{host['processor']}, {host['cores']} cores, Python {host['python']}"]
     for group, entries in groupby(_spreads(numbers), lambda entry: entry[0].partition(".")[0]):
@@ -152,7 +152,7 @@ def table(numbers: dict[str, Any], titles: Mapping[str, str]) -> str:
 
 
 def _spreads(numbers: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Each spread with its dotted name."""
+    """Each innermost dictionary with a median, and its dotted name."""
     for name, value in numbers.items():
         if isinstance(value, dict) and "median" in value:
             yield name, value

@@ -1,4 +1,4 @@
-"""The ladder: what each rung of a circuit costs on a scene, and how far it is from the top."""
+"""The ladder: cost and error of each circuit model (rung) on a scene; the top rung is 'full'."""
 
 import os
 import time
@@ -21,19 +21,20 @@ from cosim.studies.plots import GREEN, panels
 from cosim.studies.report import Progress, Report, brief, counted, markdown, silent
 
 RUNGS = ("ideal", "limited", "amplifier", "full")
-"""Cheapest first. "full" has the data sheet's output stage and the firmware's staircase besides."""
+"""Cheapest first; only "full" has the data sheet's output stage and the firmware's staircase."""
 
 RUNS = [(model, k) for k in range(3) for model in RUNGS if not (k and model == "full")]
-"""Of each scene, in turn: a rung, again for the median of its cost unless it takes long."""
+"""Runs of each scene, in order: model and repetition; three for the median cost, one of "full"."""
 
 STORE = "ladder.sqlite"
 
 
 @dataclass(frozen=True)
 class Rung:
-    """One circuit on one scene. ``cost`` are seconds of computing per simulated second: median,
-    least, most. Errors are of v_average, relative; ``fall`` is the surface's greatest downward
-    acceleration, m/s², NaN with rigid walls."""
+    """One circuit model on one scene. ``cost``: seconds of computing per simulated second (median,
+    least, most). ``off_top`` and ``off_amplifier``: relative errors of v_average against "full" and
+    "amplifier". ``fall``: the surface's greatest downward acceleration, m/s², NaN with rigid
+    walls."""
 
     model: str
     cost: tuple[float, float, float]
@@ -46,18 +47,18 @@ class Rung:
 def each_rung(
     scene: Scene, store: Store, progress: Callable[[], object] = lambda: None
 ) -> list[Rung]:
-    """Run a scene on each rung in turn, and again for the cost. Raises BadInput, SimulationFailed.
+    """Run a scene on each rung as in RUNS. Raises BadInput, SimulationFailed.
 
-    Averages are over whole periods; few rows are written, so that the cost is the rung's own.
+    Averages are over whole periods; few rows are written, so that output adds no cost.
     """
     runs = {model: _on(scene, model) for model in RUNGS}
     spent: dict[str, list[float]] = {model: [] for model in RUNGS}
     numbers: dict[str, dict[str, Any]] = {}
     own = hashed(scene.as_dict())
-    simulate(runs["limited"])  # loads and builds what the first run would wait for
+    simulate(runs["limited"])  # builds and loads libraries, which would count for the first run
 
     def once(model: str) -> tuple[float, dict[str, Any]]:
-        """Seconds, and what is needed of the summary."""
+        """Wall time, s, and the needed numbers of the summary."""
         began = time.perf_counter()
         try:
             summary = simulate(runs[model]).summary
@@ -78,30 +79,31 @@ def each_rung(
             (median(spent[model]), min(spent[model]), max(spent[model])),
             average,
             nan if (low := numbers[model]["a_surface_min"]) is None else -low,
-            *(relative_error(average, averages[other]) for other in ("full", "amplifier")),
+            *(relative_error(average, averages[against]) for against in ("full", "amplifier")),
         )
         for model, average in averages.items()
     ]
 
 
 def cheapest(rungs: list[Rung], tolerance: float) -> Rung:
-    """The cheapest one whose v_average is within ``tolerance`` (relative) of the top's."""
+    """The cheapest rung whose v_average is within ``tolerance`` (relative) of the top's."""
     return next(rung for rung in rungs if rung.off_top <= tolerance)
 
 
 def _on(scene: Scene, model: str) -> Scene:
+    """The scene on the rung ``model``, in whole periods, with three rows of output."""
     if not scene.rung.on_ladder:
         raise BadInput(
             f'scene {scene.name}: circuit.model = "{scene.circuit.model}" is no rung of the '
             f"ladder; it must be one of {', '.join(RUNGS)} or auto."
         )
-    # The schematic's command is the firmware's staircase; the others follow the same one smoothed.
+    # The command of "full" is the firmware's staircase; the other rungs follow its smooth ramp.
     staircase = model == "full" and scene.drive.waveform == "sawtooth"
     settings: dict[str, Any] = {"circuit.model": model, "drive.pwm_ripple": False}
     if staircase and not scene.drive.reset_time:
         settings["drive.quantised"] = True
-    there = in_whole_periods(changed(scene, settings, f"scene {scene.name}"))
-    return there.having(run={"output_step": there.run.duration / 2.0})
+    run = in_whole_periods(changed(scene, settings, f"scene {scene.name}"))
+    return run.having(run={"output_step": run.run.duration / 2.0})
 
 
 TOP = (
@@ -121,22 +123,22 @@ def ladder(
     out: str | os.PathLike[str] | None = None,
     progress: Progress = silent,
 ) -> Report:
-    """Run scenes on each rung of the circuit in turn: what each costs, and how far its v_average is
-    from the top's and the amplifier's.
+    """Run scenes on each rung of the circuit in turn: the cost of each, and the error of its
+    v_average against the top rung "full" and against "amplifier".
 
     In the folder ``out`` it leaves what ``Report.save`` writes, and takes up what an interrupted
     study has left there. Raises BadInput and SimulationFailed.
     """
-    every = [load(scene, overrides) for scene in scenes]
-    tick = counted(progress, len(RUNS) * len(every))
+    loaded = [load(scene, overrides) for scene in scenes]
+    tick = counted(progress, len(RUNS) * len(loaded))
     return reported(
-        lambda store: report([(scene, each_rung(scene, store, tick)) for scene in every]),
-        *(out, STORE, [scene.as_dict() for scene in every]),
+        lambda store: report([(scene, each_rung(scene, store, tick)) for scene in loaded]),
+        *(out, STORE, [scene.as_dict() for scene in loaded]),
     )
 
 
 def report(found: Found) -> Report:
-    """Which circuit each scene needs, and what it costs."""
+    """The report: each scene's cheapest sufficient rung, and the cost and error of all rungs."""
     said = [words(scene, rungs) for scene, rungs in found]
     table = [
         {
@@ -161,7 +163,7 @@ def report(found: Found) -> Report:
 
 
 def words(scene: Scene, rungs: list[Rung]) -> str:
-    """The cheapest rung within the scene's tolerance."""
+    """A sentence on the cheapest rung within the scene's tolerance."""
     tolerance, top = scene.run.tolerance, rungs[-1]
     taken = cheapest(rungs, tolerance)
     return (
@@ -173,11 +175,11 @@ def words(scene: Scene, rungs: list[Rung]) -> str:
 def draw(found: Found) -> Picture:
     """Draw error over cost, a panel a scene, and mark the cheapest rung within the tolerance."""
     wide = 2 if len(found) == 4 else min(len(found), 3)
-    high = -(-len(found) // wide)
+    high = -(-len(found) // wide)  # rows of panels, rounded up
     errors = [rung.off_top for _, rungs in found for rung in rungs]
     top = 200.0 * max(*errors, *(scene.run.tolerance for scene, _ in found))
     costs = [rung.cost[0] for _, rungs in found for rung in rungs]
-    ends = min(costs) / 6.0, max(costs) * 6.0  # with room for the names
+    ends = min(costs) / 6.0, max(costs) * 6.0  # with room for the rungs' names
     size = (max(3.8 * wide, 6.0), 3.4 * high + 0.6)
     note = (
         "Green: the cheapest rung within run.tolerance, which is shaded. Under a sawtooth “full” "
@@ -207,7 +209,7 @@ def draw(found: Found) -> Picture:
 
 
 def message(found: Found) -> str:
-    """The title of the figure."""
+    """The title of the figure: the cheapest sufficient rung of each scene."""
     by_model: dict[str, list[str]] = {}
     for scene, rungs in found:
         taken = cheapest(rungs, scene.run.tolerance)

@@ -38,7 +38,7 @@ _LINEAR: Table = {"mechanics.gravity": 0.0, "mechanics.suspension_k3": 0.0, "mec
 
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """A voice coil on two bodies, with linear mechanics: what differs from scene `reference`."""
+    """A voice coil on two bodies with linear mechanics: the scene `reference` with ``settings``."""
 
     name: str
     settings: Table
@@ -49,15 +49,16 @@ class Machine:
 
     @property
     def strength(self) -> float:
-        """How strongly coil and mechanics are coupled while the part sticks, Bl²/(m R) in 1/s; m
-        is the mass that the coil feels at once, R around what the back-EMF drives a current."""
+        """Strength of the coupling of coil and mechanics while the part sticks, Bl²/(m R), 1/s.
+        m: reduced mass of the two bodies between which the coil acts; R: resistance of the loop in
+        which the back-EMF drives a current."""
         m, coil = self.scene.mechanics, self.scene.coil
         mass = 1.0 / (1.0 / m.ram_mass + 1.0 / (m.surface_mass + m.part_mass))
         around = coil.resistance + self.scene.circuit.sense_resistance
         return coil.force_factor**2 / (mass * around)
 
     def but(self, name: str, settings: Table) -> "Machine":
-        """One that differs in some settings."""
+        """This machine under another name, with further ``settings``."""
         return Machine(name, {**self.settings, **settings})
 
 
@@ -85,7 +86,7 @@ SLOW = DIRECT.but("direct drive, 10 L", {"coil.inductance": 8.3e-3})
 
 @dataclass(frozen=True)
 class Regime:
-    """A machine at one working state, cut in two."""
+    """A machine in one working state (amplifier, part), cut into two participants."""
 
     machine: Machine
     output: Output
@@ -94,19 +95,20 @@ class Regime:
 
     @property
     def scene(self) -> Scene:
-        """The part is held, or, if it ``slips``, let go."""
+        """The scene with the part held by friction, or without friction if it ``slips``."""
         free = {"friction.mu_k": 0.0, "friction.mu_s": 0.0}
         held = {"friction.mu_s": 1000.0, "friction.normal_force": 1e9}
         return changed(self.machine.scene, free if self.slips else held, "stability")
 
 
 def _bodies(regime: Regime) -> tuple[list[list[float]], list[float]]:
-    """States q, dq/dt, z_s, dz_s/dt: their rates, and what 1 A adds to these."""
+    """Matrix (4 × 4) and input vector, per A of current, of the state equation of both bodies. The
+    states are the ram's travel q against the surface, dq/dt, the surface's height z_s, dz_s/dt."""
     m, bl = regime.machine.scene.mechanics, regime.machine.scene.coil.force_factor
     carried = m.surface_mass + (0.0 if regime.slips else m.part_mass)
     k, c = m.suspension_k1, m.suspension_damping
     kf, cf = m.flexure_stiffness, m.flexure_damping
-    both = 1.0 / m.ram_mass + 1.0 / carried
+    both = 1.0 / m.ram_mass + 1.0 / carried  # inverse of the reduced mass, 1/kg
     a = [
         [0.0, 1.0, 0.0, 0.0],
         [-k * both, -c * both, kf / carried, cf / carried],
@@ -117,16 +119,19 @@ def _bodies(regime: Regime) -> tuple[list[list[float]], list[float]]:
 
 
 def linear_sides(regime: Regime) -> tuple[LinearParticipant, LinearParticipant]:
-    """Circuit and mechanics, homogeneous, a little away from rest."""
+    """Circuit and mechanics as linear participants without sources; a small initial current
+    disturbs them from rest."""
     scene, (a, b) = regime.machine.scene, _bodies(regime)
     bl, inductance = scene.coil.force_factor, scene.coil.inductance
     if regime.cut == "coil in circuit":
+        # Mechanics: current in, back-EMF Bl dq/dt out.
         mechanics = LinearParticipant(a, [[x] for x in b], [[0.0, bl, 0.0, 0.0]])
         return circuit_of(regime), mechanics
     # Circuit: current in, coil's voltage out; the sense resistor is on its side.
     sense, rate, gain = _amplifier(scene)
     leak, driven = (0.0, 0.0) if regime.output == "saturated" else (-rate / gain, -rate * sense)
     circuit = LinearParticipant([[leak]], [[driven]], [[1.0]], [[-sense]], state=[0.0])
+    # Mechanics: coil's voltage in, current out; the current is the fifth state.
     whole = [[*row, x] for row, x in zip(a, b, strict=True)]
     whole.append([0.0, -bl / inductance, 0.0, 0.0, -scene.coil.resistance / inductance])
     enters = [[0.0]] * 4 + [[1.0 / inductance]]
@@ -135,7 +140,7 @@ def linear_sides(regime: Regime) -> tuple[LinearParticipant, LinearParticipant]:
 
 
 def circuit_of(regime: Regime) -> LinearParticipant:
-    """The circuit with the coil in it, and a milliampere."""
+    """The circuit with the coil in it, at an initial current of 1 mA."""
     scene = regime.machine.scene
     resistance, inductance = scene.coil.resistance, scene.coil.inductance
     sense, rate, gain = _amplifier(scene)
@@ -154,23 +159,24 @@ def _amplifier(scene: Scene) -> tuple[float, float, float]:
 STORE = "stability.sqlite"
 
 _COLORS = {1: ORANGE, 2: BLUE, 3: GREEN}
-"""By the order of a method."""
+"""Colours of the curves by the order of the method."""
 _MARKERS = "osD^v<>PX*hd"
 
 LONGEST = 0.1
 """s; a method that is stable up to here counts as one without a limit."""
 _SHORTEST = {"coil in circuit": 1e-5, "coil in mechanics": 1e-8}
+"""Shortest macro step, s, from which on the limit is sought, by the cut."""
 _SEEN, _MOST_STEPS = 0.15, 6000
-"""s, and macro steps, that a run is watched for."""
+"""Duration of an observed run, s, and the most macro steps that it may take."""
 
 METHODS = {
-    # An error that dies away sooner lies below the noise of the FMU's own solver.
+    # With a smaller tolerance the iteration's error would be below the noise of the FMU's solver.
     name: variant
     for name, variant in variants(tolerance=1e-7).items()
     if name not in ("event-aware", "predictor-corrector", "iterated, Aitken", "iterated, Anderson")
 }
-"""Methods whose step is one linear map wherever nothing jumps; of the iterations, the limits of the
-others are those of Newton's."""
+"""Methods whose step is one linear map between jumps. Of the iterations only Newton's is taken: the
+others have the same limits."""
 
 REGIMES = (
     Regime(DIRECT, "saturated"),
@@ -215,11 +221,12 @@ def predicted(method: str, regime: Regime) -> float:
 
 
 def observed(method: str, regime: Regime, expected: float) -> float:
-    """The same by running it, sought within a fifth about the ``expected`` limit (s).
+    """Largest stable macro step, s, by running the method; sought within ±20 % of ``expected``.
 
     Near a resonance of the mechanics an unstable interval may be narrow: hence the small leaps.
     """
     make = METHODS[method].make
+    # At the shortest step the run lasts _SEEN, but has 600 to _MOST_STEPS steps.
     low, high = 0.8 * expected, min(1.2 * expected, LONGEST)
     steps = int(min(max(600.0, _SEEN / low), _MOST_STEPS))
     with ExitStack() as alive:
@@ -274,7 +281,8 @@ def stability(
 
 
 def report(found: Sequence[Limit]) -> Report:
-    """What the limits show."""
+    """The report on the limits of all methods and regimes."""
+    # The direct drive on a voltage, its force factor varied; ``free`` methods are always stable.
     driven = [x for x in found if x.machine == DIRECT.name and x.cut == "coil in circuit"]
     free = [m for m in METHODS if all(x.predicted >= LONGEST for x in driven if x.method == m)]
     message = "The stronger the coil couples, the shorter the macro step must be"
@@ -282,7 +290,7 @@ def report(found: Sequence[Limit]) -> Report:
         have = "has" if len(free) == 1 else "have"
         message += f"; only {' and '.join(free)} {have} no limit below {LONGEST:g} s"
     worst = max(abs(x.observed / x.predicted - 1.0) for x in found)
-    swept = [x for x in driven if x.strength != DIRECT.strength]
+    swept = [x for x in driven if x.strength != DIRECT.strength]  # with other force factors
     notes = [
         f"{message}.",
         "Limits: largest macro step at which a coupling is stable, predicted from the spectral "
@@ -304,7 +312,7 @@ def report(found: Sequence[Limit]) -> Report:
 
 
 def by_method(limits: Sequence[Limit]) -> list[Row]:
-    """A row a method, a column a machine at a working state."""
+    """Table of predicted limits, ms: a row for each method, a column for each working state."""
     rows: dict[str, Row] = {}
     for x in limits:
         said = f"{x.predicted * 1e3:.3g}" if x.predicted < LONGEST else "-"

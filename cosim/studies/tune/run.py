@@ -200,8 +200,8 @@ def family(name: str) -> tuple[dict[str, Any], dict[str, tuple[float, float]]]:
 
 def most_heat(scene: Scene, limit: float | str | None) -> float:
     """The limit of the heat in a coil, W, from a number in W, "RISE:DUTY" or "RISE:DUTY:SECONDS"
-    (K, 1, s). None means that of the Carlton's range of drives in a scene with such an actuator, else no
-    limit. Raises BadInput."""
+    (K, 1, s). None means that of the Carlton's range of drives in a scene with such an actuator,
+    else no limit. Raises BadInput."""
     if limit is None:
         return DRIVE_RANGE_HEAT if scene.mechanics.free_ram else float("inf")
     try:
