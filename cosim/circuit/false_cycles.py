@@ -23,7 +23,7 @@ fewer than half as many."""
 FAST = 1e-3
 """s; swings further apart are no burst."""
 
-_FINER_TOLERANCE, _FINER_STEP = 100.0, 10.0
+_FINER_TOLERANCE, _FINER_STEP = 100.0, 10.0  # divisors of reltol and of the longest step
 
 
 def swings(log: dict[str, Array]) -> Array:
@@ -32,7 +32,8 @@ def swings(log: dict[str, Array]) -> Array:
     low = min(float(log["v(out)"][part].min()) for part in blocks(count))
     high = max(float(log["v(out)"][part].max()) for part in blocks(count))
     edge = 0.15 * (high - low)
-    found, last = [], np.empty(0, np.int64)  # the end at which the output was last
+    # Between the ends nothing is known; ``last`` carries the end reached last from block to block.
+    found, last = [], np.empty(0, np.int64)
     for part in blocks(count):
         out = log["v(out)"][part]
         at_end = np.where(out > high - edge, 1, np.where(out < low + edge, -1, 0))
@@ -45,10 +46,11 @@ def swings(log: dict[str, Array]) -> Array:
 
 
 def burst_ends(times: npt.NDArray[np.floating[Any]]) -> float | None:
-    """When the first burst of swings is complete, s; None where there is none."""
+    """The time (s) of the last of the first BURST swings in fast succession; None without any."""
     if len(times) < BURST:
         return None
     fast = np.diff(times) < FAST
+    # BURST swings have BURST - 1 intervals; the sliding sum counts the fast ones among them.
     run = np.convolve(fast, np.ones(BURST - 1), mode="valid") >= BURST - 1
     return float(times[np.argmax(run) + BURST - 1]) if run.any() else None
 
@@ -56,9 +58,9 @@ def burst_ends(times: npt.NDArray[np.floating[Any]]) -> float | None:
 def refuse_false(
     scene: Scene, log: dict[str, Array], solve: Callable[[Scene], dict[str, Array]]
 ) -> None:
-    """Raise SimulationFailed where the run's output is in a false limit cycle.
+    """Raise SimulationFailed where finer steps remove at least half of the swings up to a burst.
 
-    ``solve`` gives the log of another run of the circuit, with its mechanics.
+    ``solve`` runs another scene, circuit and mechanics, and returns its log.
     """
     times = swings(log)
     end = burst_ends(times)

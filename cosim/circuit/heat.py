@@ -2,9 +2,9 @@
 
     C_w Ṫ_w = P − (T_w − T_b)/R_w        C_b Ṫ_b = (T_w − T_b)/R_w − T_b/R_b
 
-with P the heat of the winding, W, and rises over the air, K. The circuit drives a current, so warm
-copper makes more heat, P (1 + α T_w): the equations are solved for P = 1 W, and P is then that of
-the greatest rise. In continuous use that is exact, in a cycle no less than what comes of it.
+with P the heat of the winding, W, and T the rises over the air, K. The circuit drives a current, so
+warm copper dissipates more, P (1 + α T_w). The equations are solved for P = 1 W and scaled by the
+heat at the greatest rise: exact in continuous use, an upper bound in cycles.
 **An estimate, no rating:** the data sheet of the Carlton (C-151L337V5R2) gives a range of drives,
 3.6 to 10 V peak-to-peak, and 125 mA rms, but no power and no temperature.
 Body: its 20.5 cm² lose 10 to 15 W/(m² K) to still air, and its 15 g hold 0.4 to 0.67 J/(g K).
@@ -21,12 +21,12 @@ from cosim.scene import Scene
 from cosim.scene.tables import Coil
 
 DRIVE_RANGE_HEAT = 5.0**2 / 7.1
-"""W: the most that any drive within the Carlton's range makes of its 7.1 Ohm: a square wave of
+"""W: the largest heat of any drive within the Carlton's range, in its 7.1 Ohm: a square wave of
 10 V peak-to-peak without offset. It is no rating; the authors saw the housing melt (README of their
 repository)."""
 
 RATED_CURRENT = 0.125
-"""A rms: what the data sheet of the Carlton names."""
+"""A rms, from the data sheet of the Carlton."""
 
 COPPER = 3.93e-3
 """1/K: α of copper's resistance at 20 °C (IEC 60028)."""
@@ -34,13 +34,13 @@ COPPER = 3.93e-3
 MELTED = 1065.0
 """K: the rise at which copper melts."""
 MELTED_COLD = MELTED / (1.0 + COPPER * MELTED)
-"""K: what that would be if warm copper made no more heat."""
+"""K: the rise calculated with the resistance of cold copper, when the true one reaches MELTED."""
 
 LIFT = 10.0
-"""s: a lift, of which a summary tells the rise."""
+"""s: the duration of one lift, for which a summary states the rise."""
 
 _CYCLES = ((LIFT, 0.0), (inf, 1.0))
-"""Time (s) and duty of that, and of continuous use."""
+"""On-time (s) and duty of a single lift, and of continuous use."""
 
 SPREAD = {
     **{"winding_to_body": 2.0, "winding_capacity": 1.9},
@@ -55,7 +55,8 @@ def modes(
     """Resistance (K/W) and time constant (s) of both exponentials of the winding's rise, which is
     P Σ r (1 − exp(−t/τ)) under a constant heat from t = 0 on."""
     both = winding_to_body + body_to_air
-    zero = winding_to_body * body_to_air * body_capacity
+    zero = winding_to_body * body_to_air * body_capacity  # coefficient of s in Z's numerator
+    # slow + fast and slow · fast are the coefficients of Z's denominator.
     sum_of_both = winding_capacity * both + body_capacity * body_to_air
     slow = 0.5 * (sum_of_both + sqrt(sum_of_both**2 - 4.0 * winding_capacity * zero))
     fast = winding_capacity * zero / slow
@@ -65,9 +66,9 @@ def modes(
 
 
 def rise(coil: Coil, on_time: float = inf, duty: float = 1.0, side: int = 0) -> float:
-    """The winding's greatest rise over the air, K, for each watt that it makes while it is on: for
-    ``on_time`` (s) of each of many cycles, their share ``duty``, where 0 is a single one. ``side``
-    1 and -1 take the upper and lower end of the estimate.
+    """The winding's greatest rise over the air, K, per watt of heat while the current is on:
+    ``on_time`` (s) in each of many cycles, a share ``duty`` of the cycle; duty 0 is a single
+    on-time. ``side`` 1 and -1 take the upper and lower end of the estimate, 0 its middle.
     """
     return _rise(_estimate(coil), on_time, duty, side)
 
@@ -86,18 +87,18 @@ def _rise(estimate: tuple[float, ...], on_time: float, duty: float, side: int) -
 
 
 def warmed(heat: float, cold: float) -> float:
-    """The rise, K, where a current makes ``heat`` (W) of cold copper, of which each watt warms by
-    ``cold`` (K/W, of :func:`rise`); infinite where it melts before it loses as much."""
+    """The rise, K, under a current that dissipates ``heat`` (W) in cold copper, with ``cold`` the
+    rise per watt (K/W, from :func:`rise`); infinite where the copper would melt."""
     rise_cold = heat * cold
     return rise_cold / (1.0 - COPPER * rise_cold) if rise_cold < MELTED_COLD else inf
 
 
 def heat_limit(coil: Coil, rise_limit: float, duty: float = 1.0, on_time: float = LIFT) -> float:
-    """The heat that a current makes of the cold winding while it is on, W, with which it rises by
-    ``rise_limit`` (K) over the air at most, in cycles of which it is on for ``on_time`` (s), their
-    share ``duty``.
+    """The largest heat (W, in the cold winding, while the current is on) whose rise over the air
+    stays within ``rise_limit`` (K), in cycles with the current on for ``on_time`` (s), a share
+    ``duty`` of the cycle.
 
-    Raises BadInput for what is none of these.
+    Raises BadInput for values out of range.
     """
     if not (rise_limit > 0.0 and 0.0 <= duty <= 1.0 and on_time > 0.0):
         raise BadInput(
@@ -109,21 +110,21 @@ def heat_limit(coil: Coil, rise_limit: float, duty: float = 1.0, on_time: float 
 
 
 def rises(coil: Coil, heat: float) -> list[list[float | None]]:
-    """The rises, K, that a current which makes ``heat`` (W) of the cold winding brings in a LIFT
-    and in continuous use: the lower and the upper end of the estimate of each, None without end."""
+    """The rises, K, after one LIFT and in continuous use, of a current that dissipates ``heat`` (W)
+    in the cold winding: lower and upper end of the estimate each, None where it is unlimited."""
     estimate = _estimate(coil)
     ends = [[warmed(heat, _rise(estimate, *on, side)) for side in (-1, 1)] for on in _CYCLES]
     return [[end if isfinite(end) else None for end in both] for both in ends]
 
 
 def heats(scene: Scene, energy_copper: float) -> dict[str, Any]:
-    """What a summary tells of the heat: that of one coil (W), and its rises (K), from the lower to
-    the upper end of the estimate, None without end. ``energy_copper`` (J) is that of all coils and
-    sense resistors; of what eddy currents make of it, a coil's share is counted as if its winding
-    did, which is on the safe side.
+    """A summary's entries on heat: the mean power in one coil (W), and its :func:`rises` (K).
+
+    ``energy_copper`` (J) is dissipated in all coils and sense resistors. It includes the losses by
+    eddy currents, which are counted as heat of the winding; that is on the safe side.
     """
     coil = scene.coil
-    # A user's netlist has the sense resistor's share to itself.
+    # With a user's netlist ``energy_copper`` has no sense resistor in it.
     sense = 0.0 if scene.rung.own_netlist else coil.count * scene.circuit.sense_resistance
     share = coil.resistance / (coil.resistance + sense)
     coils = coil.count * (1 if scene.drive.phase_deg is None else 2)

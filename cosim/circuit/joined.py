@@ -1,7 +1,7 @@
-"""A netlist of the user's own that a scene's ports join to FMUs: nothing in it has a role.
+"""A user's netlist that a scene's ports join to FMUs: no source or node in it has a fixed role.
 
-Its sources that a port feeds become external; what is to be read is a vector, or an expression
-that ngspice computes itself, as the voltage of a source that is put in.
+Sources that a port feeds become external. A quantity to read is a vector of ngspice's, or an
+expression, which an added B source computes as its voltage.
 """
 
 import re
@@ -20,11 +20,11 @@ from cosim.circuit.outputs import Measure, measures, without_effect
 from cosim.errors import BadInput, plain
 from cosim.scene.messages import ended, suggestion
 
-# Ground is no vector of ngspice's, but may stand in an expression.
+# v(node) or i(source), but not v(0): ground is no vector of ngspice's, only in expressions.
 _VECTOR = re.compile(r"(v(?!\s*\(\s*(?:0|gnd)\s*\))|i)\s*\(\s*([^\s(),]+)\s*\)", re.IGNORECASE)
-_SUM = re.compile(r"[-+](?![^()]*\))")
+_SUM = re.compile(r"[-+](?![^()]*\))")  # a sign outside parentheses
 _FACTOR = re.compile(r"[vi]\s*\([^()]*\)", re.IGNORECASE)
-_UNITS = {"v": "V", "i": "A", "iv": "W", "vv": "V2", "ii": "A2"}
+_UNITS = {"v": "V", "i": "A", "iv": "W", "vv": "V2", "ii": "A2"}  # by the sorted factors
 _CURRENTS = "vleh"  # elements whose current ngspice computes as an unknown
 _READ = f"{_CURRENTS}rcdgfbi"  # elements whose current a B source may read
 _NODE = "cosim_read"
@@ -32,27 +32,27 @@ _NODE = "cosim_read"
 
 @dataclass(frozen=True)
 class Deck:
-    """What ngspice gets, and the names of what it sends."""
+    """The deck for ngspice, and the names of the vectors that it sends."""
 
     text: str
     kinds: Mapping[str, str]
     """``v`` or ``i`` of each source that a port feeds, by its lower-case name."""
     vectors: tuple[str, ...]
-    """What is saved, in the order of ``words``."""
+    """The saved vectors, in the order of ``words``."""
     words: tuple[str, ...]
-    """Those that were asked for, then those that the measurements need."""
+    """Vectors and expressions: those that the scene reads, then those that ``measures`` need."""
     measures: tuple[Measure, ...]
     """The netlist's own ``.meas``."""
     notes: tuple[str, ...]
-    """What has no effect in it."""
+    """Sentences on lines of the netlist that have no effect."""
     devices: tuple[str, ...]
-    """The device parameter that has the same within a step, for each."""
+    """For each word the device parameter that has its value within a step; "" without one."""
     pulses: tuple[str, ...]
     """ngspice's names of the sources with PULSE."""
 
 
 def unit(words: str) -> str:
-    """Of a vector, a product of vectors, or a sum of such; "?" where it is not known."""
+    """The unit of a vector, a product of vectors, or a sum of these; "?" for any other words."""
     terms = _SUM.split(words)
     if len(terms) > 1 and all(map(str.strip, terms)):
         first, *others = map(unit, terms)
@@ -76,11 +76,13 @@ def deck(
     called: tuple[str, str] = ("[[port]] source", "probe or circuit.save"),
     through: Sequence[tuple[str, str]] = (),
 ) -> Deck:
-    """The deck of a netlist in which the ``sources`` are external and the ``words`` are saved;
-    where they are ``asked`` for within a step, each as a device's parameter. ``known`` are values
-    for such ``.param`` lines as it may have, ``parameters`` for those that it must have. For each
-    source and word of ``through`` the circuit adds the word, times the external source
-    ``Vcosim_gain`` with the pair's number, to the source. Sources and words are ``called`` so.
+    """The deck of a netlist in which the ``sources`` are external and the ``words`` are saved. If
+    the words are ``asked`` for within a step, each is also available as a device's parameter.
+
+    ``known`` are values for ``.param`` lines that the netlist may have, ``parameters`` for those
+    that it must have. For each pair (source, word) of ``through`` the circuit adds the word to the
+    source, times the external source ``Vcosim_gain`` with the pair's number. ``called`` is what
+    messages call a source and a word.
 
     Raises BadInput: for the netlist with its line, for the rest with what is wrong in the scene.
     """
@@ -118,29 +120,31 @@ def deck(
 
 
 _ONE_BREAK, _ONE_TIME = 1e-10, 3e-15
-"""Of the longest step and of the run: nearer than that two edges are one. ngspice's own is the
-first, less than the rounding of its times in a long run with short steps: then a step between an
-edge and the same edge, which two sources round differently, makes noise of amperes."""
+"""Two edges nearer than these shares, of the longest step and of the run's duration, count as one.
+ngspice itself has only the first, which a long run with short steps makes less than the rounding of
+times. Two sources that round one edge differently then cause a tiny step with noise of amperes."""
 
 
 def own_step(dropped: Sequence[Line]) -> float | None:
-    """The step, s, of the netlist's own .tran line; None where it has none, as LTspice's lines of
-    a stop time alone, or 0 for a step."""
+    """The step, s, of the netlist's own .tran line; None without one: LTspice writes the stop time
+    alone, or 0 for the step."""
     for line in dropped:
         word, *times = line.text.lower().split()
         if word == ".tran":
+            # A single number is LTspice's stop time, so a step counts only with a stop behind it.
             step, stop = ([number(time) for time in times] + [None, None])[:2]
             return step if step and stop else None
     return None
 
 
 def _edges(step: float, sources: Iterable[Sequence[str]]) -> float:
-    """The length, s, of edges that have none: a step, but at most 1 % of a PULSE's on-time and
-    period, as simulators each take another one."""
+    """The length, s, of edges whose rise or fall time is not given. Simulators differ in it; here
+    it is a step, but at most 1 % of the shortest on-time or period of a PULSE."""
     lengths = [step]
     for words in sources:
         if "pulse" in words:
             values = [number(word) for word in words[words.index("pulse") + 1 :]]
+            # PULSE(v1 v2 delay rise fall on-time period)
             lengths += [0.01 * value for value in values[5:7] if value]
     return min(lengths)
 
@@ -155,9 +159,9 @@ def text_of(
     max_step: float,
     own: float | None = None,
 ) -> str:
-    """What ngspice gets of a netlist: other lines for ``external`` sources, ``values`` for the top
-    level's parameters, and the analysis. The netlist's ``own`` step, s, is what the edges of its
-    PULSE and EXP sources take that are given no time, as far as it is short enough for an edge."""
+    """The deck for ngspice: the netlist with the lines of ``external`` sources replaced, ``values``
+    for the top level's parameters, and the analysis. The netlist's ``own`` step, s, is the length
+    of edges of its PULSE and EXP sources that have none, as far as it is short enough."""
     text = [title.text]
     for line, element, holder in top.order:
         if holder is top and line in external:
@@ -168,10 +172,10 @@ def text_of(
     sources = [element.words for _, element, _ in top.order if element and element.kind in "vi"]
     edges = any({"pulse", "exp"} & {*words} for words in sources)
     step = min(_edges(own or max_step, sources), duration) if edges else max_step
-    one = max(_ONE_BREAK * max_step, _ONE_TIME * duration)
+    min_break = max(_ONE_BREAK * max_step, _ONE_TIME * duration)
     text += [
-        # Without norefvalue it asks for the CPU time at each step, to print how far it is.
-        f".options norefvalue reltol={reltol!r} minbreak={one!r}",
+        # Without norefvalue ngspice reads the CPU time at each step, to print its progress.
+        f".options norefvalue reltol={reltol!r} minbreak={min_break!r}",
         # All vectors are sent step by step; ngspice is to keep none, which would take memory.
         ".save none",
         f".tran {step!r} {duration!r} 0 {max_step!r}",
@@ -181,7 +185,8 @@ def text_of(
 
 
 def _external(element: Element, through: Sequence[tuple[str, str]]) -> Iterator[str]:
-    """The lines of a source that the host gives its value."""
+    """The lines of a source whose value the host sets; with ``through``, a B source adds terms to
+    it: in series with a voltage source, in parallel with a current source."""
     (plus, minus), name = element.nodes, element.name
     shares = [(k, words) for k, (source, words) in enumerate(through) if source.lower() == name]
     between = minus
@@ -204,8 +209,8 @@ def check_reading(
     asked: bool = False,
     called: str = "probe or circuit.save",
 ) -> tuple[Scope, list[str]]:
-    """The top level of a netlist with what reads the ``words`` and what the measurements need, as
-    :func:`check` gives it; and all these words, each once."""
+    """Check a netlist to which sources are added that read the ``words`` and those of the
+    measurements ``asks``. Returns its top level, and all these words, each once."""
     name = plain(path)
     for each in words:
         if not each.strip():
@@ -221,8 +226,8 @@ def check_reading(
 
 
 def reading(words: Sequence[str], asked: int = 0) -> list[tuple[str, str]]:
-    """For each of the words the vector that has its value, and the device parameter. So many of
-    them, the first, are asked for within a step, where only currents have a parameter."""
+    """For each of the words the vector and the device parameter ("" without one) that have its
+    value. The first ``asked`` words are also read within a step, by the parameter."""
     found = []
     for place, match in enumerate(_direct(words, asked)):
         if match is None:
@@ -234,8 +239,9 @@ def reading(words: Sequence[str], asked: int = 0) -> list[tuple[str, str]]:
 
 
 def _direct(words: Sequence[str], asked: int) -> list[re.Match[str] | None]:
-    # Within a step a node's voltage is not to be had: a source that copies it is.
-    # Nor has ngspice a vector for every current, but a source may read each.
+    # The match of each word that is a vector as it stands; None where a B source must compute it.
+    # Within a step ngspice gives no node's voltage, but that of a source that copies it. Nor has it
+    # a vector for every current, while a source may read each.
     found = []
     for k, each in enumerate(words):
         match, current = _VECTOR.fullmatch(each), each[:1].lower() == "i"
@@ -245,14 +251,15 @@ def _direct(words: Sequence[str], asked: int) -> list[re.Match[str] | None]:
 
 
 def _source_of(place: int, words: Line) -> Line:
-    """A source whose voltage is the expression."""
+    """A source whose voltage is the expression; refused like a line of the netlist."""
     line = replace(words, text=f"Bcosim{place} {_NODE}{place} 0 V={words.text}")
-    passed(line)
+    passed(line)  # raises BadInput for what may not stand in a netlist
     return line
 
 
 def _check_vectors(top: Scope, wanted: Iterable[Line]) -> None:
-    """What is wanted must be there, as far as that can be known without subcircuits."""
+    """Raise BadInput for a node or current that the top level lacks; names with a dot or colon lie
+    in subcircuits, and are not looked up."""
     known: dict[str, set[str]] = {
         "v": {node for element in top.elements for node in element.nodes} | {"0"},
         "i": {each.name for each in top.elements if each.kind in _READ},
@@ -283,13 +290,14 @@ def own_parameters(top: Scope, name: str, given: Mapping[str, float]) -> dict[st
 
 
 def _pulses(top: Scope, fed: set[str]) -> Iterator[str]:
+    """ngspice's names of the sources with PULSE, such as ``v.x1.x2.v3``, but for those fed."""
     for path, element in _everywhere(top, ""):
         if element.kind in "vi" and "pulse" in element.words and (path or element.name not in fed):
             yield f"{element.kind}.{path}{element.name}" if path else element.name
 
 
 def _everywhere(scope: Scope, path: str) -> Iterator[tuple[str, Element]]:
-    """Each element, in calls of subcircuits too, with the path of calls that lead to it."""
+    """Each element, also those in subcircuits, with the path of calls that lead to it."""
     for element in scope.elements:
         yield path, element
         called: Any = scope.subcircuit(element.model or "") if element.kind == "x" else None

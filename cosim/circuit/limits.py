@@ -1,4 +1,4 @@
-"""For how much of each step of the circuit the amplifier's limits act."""
+"""The share of each time step during which the amplifier's limits act."""
 
 import numpy as np
 import numpy.typing as npt
@@ -6,30 +6,30 @@ import numpy.typing as npt
 from cosim.arrays import Array
 
 _NODES = {"swing": ("v(swing)", "v(out)"), "current_limit": ("v(climit)", "i(vemf)")}
-"""The node that tells of a limit, which falls about straight while the limit ceases to act; and
-what the limit holds, which came there about straight."""
+"""For each limit its node, which falls about linearly to 0 while the limit ceases to act, and the
+quantity that it limits, which approaches its limit about linearly."""
 
 
 def shares_of_steps(log: dict[str, Array], least: float) -> dict[str, Array]:
     """The share of each step of the log in which each known limit acts, by name, and ``output`` for
-    any of them but the slew rate, if the swing is known; ``least`` is the magnitude, V, from which
-    on a node tells that its limit acts.
+    any of them but the slew rate, if the swing is known. A limit acts while the magnitude of its
+    node is at least ``least``, V.
 
-    Where a limit begins or ends within a step, the straight line through the two points before it
-    tells when: there what the limit holds reaches the value that it then has, and the limit's node
-    falls to ``least``. Where a line leads nowhere, as for a node that only says yes or no, the step
-    counts half.
+    Where a limit begins or ends within a step, a straight line through the two points before is
+    extrapolated. It begins when the limited quantity reaches its value at the step's end; it ends
+    when the node falls to ``least``. Where the line does not lead there, as for a node of only two
+    values, the step counts half.
     """
     found: dict[str, Array] = {}
     time = log["time"]
     for name, acts in _at_work(log, least).items():
         # A step lies between two points of the log. It counts whole where the limit acts at both,
-        # half where at one; of those halves the lines below know better.
+        # half where it acts at one; the extrapolation below improves on the half.
         shares = 0.5 * acts[1:] + 0.5 * acts[:-1]
         kind = name.removesuffix("_high").removesuffix("_low")
         if kind in _NODES:
             node, held = (log[vector] for vector in _NODES[kind])
-            # Steps by their first point, which has one before it: no, no, yes and yes, yes, no.
+            # First points of the steps in which it begins (off, off, on) or ends (on, on, off).
             begins = np.flatnonzero(~acts[:-2] & ~acts[1:-1] & acts[2:]) + 1
             ends = np.flatnonzero(acts[:-2] & acts[1:-1] & ~acts[2:]) + 1
             shares[begins] = 1.0 - _place(time, held, begins, held[begins + 1])
@@ -42,8 +42,8 @@ def shares_of_steps(log: dict[str, Array], least: float) -> dict[str, Array]:
 
 
 def _place(time: Array, values: Array, steps: npt.NDArray[np.int64], goal: Array) -> Array:
-    """Where in each of the steps, as a share of it, the values reach the goal if they go on as in
-    the step before; a half where they do not go there."""
+    """The share of each step after which the values reach the goal, extrapolated with the slope of
+    the step before; a half where they move away from it."""
     slope = (values[steps] - values[steps - 1]) / (time[steps] - time[steps - 1])
     needed, possible = goal - values[steps], slope * (time[steps + 1] - time[steps])
     place = np.full(len(steps), 0.5)
@@ -52,7 +52,7 @@ def _place(time: Array, values: Array, steps: npt.NDArray[np.int64], goal: Array
 
 
 def _at_work(log: dict[str, Array], least: float) -> dict[str, npt.NDArray[np.bool_]]:
-    """Which limits of the amplifier act, at each point of the log, by name; only those known."""
+    """By the name of each limit with a node in the log: whether it acts, at each point."""
     nothing = np.zeros(len(log["time"]))
     known: dict[str, npt.NDArray[np.bool_]] = {}
     limited = np.abs(log.get("v(climit)", nothing)) >= least

@@ -19,10 +19,12 @@ REQUIRED = (("vemf", "vcommand"), ("vemf", "vdac", "voffset"))
 _NUMBER = re.compile(r"[+-]?(?:\d|\.\d)")
 _OPERATOR = re.compile(r"[*/^]")
 _BARE = re.compile(r"\b(?:[rclq]|flux)\s*=([^=]*?[()*/^][^=]*?)(?=\s\w+\s*=|$)", re.IGNORECASE)
-"""A value with operators outside braces, which ngspice does not evaluate."""
-_FACTOR = re.compile(r"\s[rcl]\s*=\s*(?!1(?:\.0*)?(?![\w.]))[^\s()]+")
+"""R=, C=, L=, Q= or flux= with operators outside braces, which ngspice does not evaluate; it ends
+at the next key."""
+_FACTOR = re.compile(r"\s[rcl]\s*=\s*(?!1(?:\.0*)?(?![\w.]))[^\s()]+")  # in a model; not 1
 _WAVES = {"pulse": 7, "sin": 6, "exp": 6}
-"""Most values of each: one more is a number of periods in LTspice, and a phase in ngspice."""
+"""Most values that each takes; the next one is a number of periods in LTspice, a phase in ngspice.
+"""
 _FOREIGN = (
     ("d", re.compile(r"\b((?:rev)?ilimit)\s*="),
      "is LTspice's ideal diode; write is, n and rs, or a B source"),
@@ -31,8 +33,10 @@ _FOREIGN = (
     ("sw", re.compile(r"\b([vi]h)\s*=\s*[{']?\s*-"),
      "below 0 is LTspice's smooth switch; give it as a plain number"),
 )  # fmt: skip
-"""What models of these elements mean in LTspice alone, and ngspice would ignore."""
+"""Kinds of elements, parameters of their models that LTspice alone knows (ngspice would ignore
+them), and the end of the message."""
 _NO_VALUES = {"m", "temp", "dtemp", "tc", "tc1", "tc2", "ic", "scale", "noisy"}
+"""Keys of R, C and L other than the value itself."""
 _WAVEFORMS = word_set(
     """dc ac pulse sin exp pwl sffm am trnoise trrandom external distof1 distof2 portnum z0 pwr freq
     phase r td"""
@@ -172,7 +176,7 @@ def _check_passive(element: Element, scope: Scope, names: Names) -> None:
 
 
 def _values(words: Sequence[str]) -> list[str]:
-    """Those of a waveform: the words up to another one or an assignment."""
+    """A waveform's values: the words up to another waveform or an assignment."""
     return [*takewhile(lambda word: word not in _WAVEFORMS and "=" not in word, words)]
 
 
@@ -190,9 +194,9 @@ def _check_source(element: Element, scope: Scope, names: Names) -> None:
             element.refuse(": write the times of PWL since the start, not since the last one")
         if "repeat" in after:
             element.refuse(": instead of REPEAT write r=0 after the points of PWL")
-        for one, other in pairwise(map(number, _values(after)[::2])):
-            if one is not None and other is not None and one > other:
-                element.refuse(f": the times of PWL must rise, {other:g} s comes after {one:g} s")
+        for last, time in pairwise(map(number, _values(after)[::2])):
+            if last is not None and time is not None and last > time:
+                element.refuse(f": the times of PWL must rise, {time:g} s comes after {last:g} s")
     for word in element.words:
         plain = word.lstrip("+-")
         if _OPERATOR.search(unbraced(word)):
@@ -223,7 +227,7 @@ def _check_named(element: Element, scope: Scope, what: str, names: Iterable[str]
 
 
 def _plain(names: Iterable[str]) -> Iterator[str]:
-    """Those that are no paths into subcircuits, which are not followed."""
+    """The names without paths into subcircuits, which are not followed."""
     return (name for name in names if "." not in name and ":" not in name)
 
 

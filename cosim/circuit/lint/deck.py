@@ -25,9 +25,10 @@ MAX_LINES = 100_000
 MAX_WORD = 4_000
 MAX_DEPTH = 10
 MAX_INCLUDES = 1_000
-"""A file counts as often as it is included: that doubles with each file that includes two."""
+"""A file counts each time it is included: a chain of files that each include the next one twice
+doubles the count at every file."""
 MAX_NAMES = 1_000
-"""Of files, in one file."""
+"""File names that :func:`named` follows from one file."""
 
 
 KEPT = word_set(
@@ -56,7 +57,8 @@ DROPPED_OPTIONS = word_set(
     "nopage numdgt opts plotabstol plotreltol plotvntol plotwinsize post probe savecurrents "
     "runlvl srcstepmethod stepgmin thev_induc topologycheck warn width wnflag"
 )
-"""Of output, which a host sets itself (``interp`` gives wrong waveforms), and of other programs."""
+"""Options for output, which a host sets itself (``interp`` gives wrong waveforms), and options of
+other programs."""
 
 MODELS = word_set("r res c l d npn pnp nmos pmos vdmos njf pjf nmf pmf sw csw vswitch iswitch ltra")
 """Not numd, nbjt, numos, whose cards name files, and no code models."""
@@ -68,29 +70,33 @@ _GATES = (
     "Td, Trise, Tfall, Tau, Rout, Cout"
 )
 _INLINED = (".include", ".inc", ".lib")
+# The parameter's name and the first value of its list or range.
 _STEP = re.compile(
     r"\.step\s+(?:(?:oct|dec|lin)\s+)?param\s+([a-z_]\w*)\s+(?:list\s+)?([^\s{}'=]+)", re.IGNORECASE
 )
 _END = re.compile(r"^[ \t]*\.end\b(?![.\w])", re.IGNORECASE | re.MULTILINE)
 _SCHEMATIC = re.compile(r"Version 4\S*\s+SHEET ")
-_TEXT = re.compile(r"[ -~]*")
+_TEXT = re.compile(r"[ -~]*")  # printable ASCII
 _UNSAFE = re.compile(r'["`\\]')
 _FILE_WORD = re.compile(r"\b(?:\w*_)?(?:file|filename|wavefile)\b", re.IGNORECASE)
 _COMMAND_COMMENT = re.compile(r"\*\s*(?:#\s*[\w!/.]|ng_script)", re.IGNORECASE)
-_TRAILING = re.compile(r";|//|(?:^|(?<=[\s,]))\$")
+_TRAILING = re.compile(r";|//|(?:^|(?<=[\s,]))\$")  # begins a comment; "$" only between words
+# A name, perhaps with "=" and a value in braces, quotes or bare.
 _OPTION = re.compile(r"([a-z_]\w*)(?:\s*=\s*(\{[^{}]*\}|'[^']*'|[\w.+-]+))?[\s,]*", re.IGNORECASE)
+# The model's type, or "ako:BASE" with a type that may follow it.
 _MODEL = re.compile(
     r"\.model\s+[^\s=(){}']+\s+(ako:[^\s(){}'=]+(?:\s+[a-z]\w*(?![\w:=]))?|[a-z]\w*)(?![\w:])",
     re.IGNORECASE,
 )
 _LEVEL = re.compile(r"(?<![\w.])level\s*(=?)\s*([^\s,()]*)", re.IGNORECASE)
-_PIECE = r"""(?:"([^"\n]*)"|'([^'\n]*)'|([^\s"'()]+))"""
+_PIECE = r"""(?:"([^"\n]*)"|'([^'\n]*)'|([^\s"'()]+))"""  # a file's name, quoted or bare
 _NAMES = re.compile(_PIECE)
-_POINTS = re.compile(rf"(?<=pwl)([\s(]*)file\b\s*=?\s*{_PIECE}", re.IGNORECASE)
+_POINTS = re.compile(rf"(?<=pwl)([\s(]*)file\b\s*=?\s*{_PIECE}", re.IGNORECASE)  # PWL(file=NAME)
+# What follows a directive or a key that names a file, to the end of the line.
 _NAMED = re.compile(
     r"^[ \t]*\.(?:include|inc|lib)[\s+]+(.*)|\bfile\b[\s=+]*(.*)", re.IGNORECASE | re.MULTILINE
 )
-_ELSEWHERE = re.compile(r"[a-z]:|/|.*\.\.(?:/|$)", re.IGNORECASE)
+_ELSEWHERE = re.compile(r"[a-z]:|/|.*\.\.(?:/|$)", re.IGNORECASE)  # C:…, /… or ../
 _STANDARD = re.compile(
     r"(?<![\w.-])(?:standard\.(?:bjt|dio|mos|jft|cap|ind|res|bead)|nom\.lib)\b", re.IGNORECASE
 )
@@ -98,21 +104,22 @@ _STANDARD = re.compile(
 
 
 def _beside(name: str) -> str:
-    """The name from the netlist's folder: of a path that leads elsewhere its last part alone, since
-    programs write where a file lay on another machine."""
+    """A file's name relative to the file that names it. A path that leads elsewhere is cut to its
+    last part, since programs write where a file lay on another machine."""
     plain = name.strip("\"' \t\r").replace("\\", "/")
     return plain.rpartition("/")[2] if _ELSEWHERE.match(plain) else plain
 
 
 def named(path: Path) -> list[Path]:
-    """The netlist, and the files of its folder that it and they name: all that a process which
-    reads it must be let read. A name that is not found here is refused there."""
+    """The netlist and the files of its folder that it includes, directly or not: what a process in
+    a sandbox must be allowed to read. Names that are not found are skipped; ``read`` refuses them.
+    """
     folder, found, size = path.parent.resolve(), [path], 0
-    for one in found:
+    for including in found:  # which grows meanwhile
         try:
-            data = reader.read(one, MAX_BYTES - size)
+            data = reader.read(including, MAX_BYTES - size)
             text = _text(data)
-        except (reader.Refused, OSError, ValueError):  # a NUL in its name
+        except (reader.Refused, OSError, ValueError):  # the last for a NUL in the name
             continue
         size += len(data)
         rests = ["".join(groups) for groups in _NAMED.findall(text)]
@@ -120,7 +127,7 @@ def named(path: Path) -> list[Path]:
         names = {_beside(name) for name in (*rests, *pieces, *_STANDARD.findall(text))}
         for name in sorted(names)[:MAX_NAMES]:
             with suppress(OSError, ValueError, RuntimeError):
-                file = (one.parent / name).resolve()
+                file = (including.parent / name).resolve()
                 if file not in found and file.is_relative_to(folder) and file.is_file():
                     found.append(file)
     return found
@@ -147,12 +154,12 @@ class _Reader:
     bytes_read: int = 0
     includes: int = 0
     depth: int = 0
-    """Of subcircuits about the line."""
+    """How many subcircuits enclose the line."""
 
     def deck(self) -> list[Line]:
         name = shown(self.path.name)
         text = self._top()
-        if _END.search(text):  # else it may be any file, of which no message may tell a word
+        if _END.search(text):  # without .end it may be any file, and no message may quote it
             title, _, rest = text.partition("\n")
             self.lines.append(Line(_title(Line(title, name, 1)), name, 1))
             if self._take(_logical(rest, name, 2), (self.path,)):
@@ -168,7 +175,7 @@ class _Reader:
         refuse(last, "the netlist does not end with .end, so it may be cut short")
 
     def _stepped(self) -> Iterator[Line]:
-        """For parameters that only a .step has values for: .param lines with the first ones."""
+        """.param lines, with its first value, for each parameter that only a .step line defines."""
         known = "\n".join(line.text for line in self.lines if line.text.startswith(".param"))
         for line in self.dropped:
             step = _STEP.match(line.text)
@@ -193,13 +200,16 @@ class _Reader:
     def _take(
         self, lines: Iterator[Line], opened: tuple[Path, ...], section: str | None = None
     ) -> bool:
-        """Take the lines of a file, or of a section of it; whether ``.end`` or that was met."""
+        """Take the lines of a file, or those of a ``section`` between .lib and .endl; ``opened``
+        are the files that include each other, the current one last. Returns whether ``.end``, or
+        the section, was found."""
         inside = section is None
         found = False
         for line in lines:
             word, rest = _directive(line)
             if section is not None and word in (".lib", ".endl"):
                 name = rest.strip("\"' \t").lower()
+                # A .lib with one word begins a section; with two it includes a file's section.
                 if word == ".endl" or len(rest.split()) == 1:
                     inside = word == ".lib" and name == section
                     found = found or inside
@@ -233,7 +243,7 @@ class _Reader:
         if standard := _STANDARD.search(rest):
             rest = standard[0]
             if not os.path.lexists(opened[-1].parent / rest):
-                return  # a model of it that is needed is missed where it is used
+                return  # if a model of it is needed, its use is refused
         pieces = ["".join(piece) for piece in _NAMES.findall(rest)]
         if len(pieces) > 2 or os.path.lexists(opened[-1].parent / _beside(rest)):
             pieces = [rest]  # a name with blanks
@@ -268,7 +278,7 @@ class _Reader:
         return replace(line, text=text)
 
     def _inside(self, line: Line, name: str, base: Path) -> Path:
-        """The regular file that a name means, if it lies in the netlist's own folder."""
+        """The regular file of this name, which must lie in the netlist's own folder."""
         name, given = _beside(name), name
         if not name.isprintable() or re.search(r"[:$~|*?<>`;]", name):
             refuse(line, f"{shown(name)} is no plain file name: rename the file")
@@ -297,7 +307,7 @@ class _Reader:
 
 
 def _text(data: bytes) -> str:
-    """Of UTF-8, of the UTF-16 and the Latin letters of Windows, with or without their marks."""
+    """Decoded from UTF-8, or Windows' UTF-16 or code page 1252, with or without byte order mark."""
     coding = "utf-8-sig"
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         coding = "utf-16"
@@ -310,8 +320,8 @@ def _text(data: bytes) -> str:
 
 
 def _decoded(data: bytes, name: str) -> str:
-    """The text, lines ended by line feeds; any other sign that some program takes for a line's end
-    or does not show is refused."""
+    """The text, its lines ended by line feeds. Any other character that some program takes for a
+    line's end, or does not show, is refused."""
     text = _text(data).rstrip("\x1a").replace("\f", " ")  # printers' and DOS's ends
     for place, char in enumerate(text):
         if char not in "\n\t" and category(char) in ("Cc", "Cf", "Cs", "Zl", "Zp"):
@@ -335,7 +345,7 @@ def _title(line: Line) -> str:
 
 
 def _logical(text: str, file: str, first: int) -> Iterator[Line]:
-    """The lines with content, as ngspice knows them."""
+    """The lines with content, translated to ngspice's dialect."""
     for line in _joined(text, file, first):
         yield from in_ngspice(line)
 
@@ -384,8 +394,8 @@ def _directive(line: Line) -> tuple[str, str]:
 
 
 def passed(line: Line) -> str | None:
-    """The text of a logical line if ngspice may see it, None if it is dropped, a line ``UNKNOWN``
-    with the reason if it is to be refused where its subcircuit is used. Raises BadInput."""
+    """The text of a logical line if ngspice may see it; None if the line is dropped; ``UNKNOWN``
+    and a reason if only the use of its subcircuit is to be refused. Raises BadInput."""
     word, rest = _directive(line)
     if "ng_script" in line.text.lower():
         refuse(line, "ng_script would make the netlist a script of commands")
@@ -434,7 +444,7 @@ def _model(line: Line) -> str:
     match = _MODEL.match(line.text)
     if match is None:
         refuse(line, f"{shown(line.text)} is no complete .model line")
-    kind = match[1].lower().split()[-1]  # of a kind of another model it may not be told
+    kind = match[1].lower().split()[-1]  # "ako:BASE" where no type follows it
     if kind not in MODELS and not kind.startswith("ako:"):
         return f"{UNKNOWN}models of type {shown(kind)} are not allowed in a netlist"
     if kind in MODELS - {"nmos", "pmos"}:
