@@ -1,10 +1,10 @@
-"""What LTspice and PSpice write otherwise than ngspice, in ngspice's words.
+"""Translates the dialects of LTspice and PSpice to ngspice's.
 
-Each logical line is rewritten before anything looks at it, so the checks see what ngspice will see.
-What cannot be rewritten stays as it is, and is refused where it is used.
+Each logical line is rewritten before any check, so the checks see what ngspice will see. What
+cannot be rewritten stays as it is, and is refused where it is used.
 
-Polynomials and tables become behavioural sources. ngspice has code models for them, which its
-library does not bring on every machine, which cost each step, and which round a table's corners.
+Polynomials and tables become behavioural sources. ngspice has code models for them, but these are
+not installed on every machine, take time in each step, and round a table's corners.
 """
 
 import re
@@ -19,16 +19,17 @@ from cosim.circuit.lint.laplace import without_laplace
 from cosim.circuit.lint.lines import COPY, MAX_LINE, Line, refuse, shown
 from cosim.circuit.lint.words import closing, number, split_arguments, word_set, words
 
-_Key = tuple[Any, ...]  # a scope, and what is named in it
+_Key = tuple[Any, ...]  # a scope, and a name in it, perhaps with the kind of element before it
 
 
 _LETTERS = str.maketrans(
     {"\u00b5": "u", "\u03bc": "u", "\u03a9": "ohm", "\u2126": "ohm", "\u00a7": "_"}
 )
-"""Both micros, both ohms, and what LTspice puts between the kind of a part and its name."""
+"""Both micros, both ohms, and the section sign that LTspice puts between a part's kind and name."""
 _MOST = 50
-"""Coefficients of a polynomial, and tables in a line."""
+"""At most so many coefficients of a polynomial, and so many tables or integrals in a line."""
 
+# The switch's control c, scaled to -0.5 at "off" (f) and 0.5 at "on" (n).
 _WAY = "min(max((c-0.5*(n+f))/(n-f),-0.5),0.5)"
 FUNCTIONS = {
     "if": ("c,x,y", "ternary_fcn((c)>0.5,x,y)"),
@@ -48,10 +49,10 @@ FUNCTIONS = {
     "cosim_switch": ("c,n,f,r,q", f"exp(-0.5*ln(r*q)-ln(r/q)*{_WAY}*(1.5-2*{_WAY}**2))"),
     "cosim_diode": ("x,f,b,r,q,d", "x/q+max(x-f,0)*(1/r-1/q)-max(-x-b,0)*(1/d-1/q)"),
 }
-"""Their functions that ngspice lacks, or takes for others in B sources (there ``pwr`` has the sign
-of x, ``pow`` never one): parameters, and the same in its own; at 0 a root has a slope. The
-logarithm of a switch's resistance is a cubic of the control (Cadence, *PSpice Reference Guide*,
-voltage-controlled switch)."""
+"""Functions of LTspice and PSpice that ngspice lacks, or defines otherwise in B sources (there
+``pwr`` has the sign of x, ``pow`` never a sign): formal parameters, and the body for ngspice. 1e-99
+keeps the slope of roots finite at 0. The logarithm of a switch's resistance is a cubic of its
+control (Cadence, *PSpice Reference Guide*, voltage-controlled switch)."""
 _CALL = re.compile(r"(?<![\w.])([a-z_]\w*)\s*\(")
 _DEFINED = re.compile(r"\.func\s+(\w+)|(\w+)\s*(?:\([^()]*\)\s*)?=(?!=)")
 _TABLE = re.compile(r"(?<![\w.])table\s*\(", re.IGNORECASE)
@@ -63,49 +64,54 @@ _REMARKS = {
     "c": word_set("v irms vrms mtbf") | _MAKERS,
     "l": word_set("ipk irms mtbf") | _MAKERS, "vdmos": word_set("vds ron") | _MAKERS,
 }  # fmt: skip
-"""Ratings, makers and LTspice's steps, which nothing computes with."""
+"""Keys of parts and models that do not affect the simulation: ratings, makers, step control."""
 _PARASITES = {"c": word_set("rser lser rpar cpar rlshunt"), "l": word_set("rser rpar cpar"),
               "v": word_set("rser cpar"),
               **dict.fromkeys("befghi", word_set("rpar cpar"))}  # fmt: skip
 _VALUE = r"(\{[^{}]*\}|'[^']*'|[^\s,()\"{}'=]++)"
+# KEY=VALUE, the value in double quotes or as _VALUE, without the latter's group.
 _PAIR = re.compile(rf"""(?<!\S)([a-z]\w*)\s*=\s*("[^"]*"|{_VALUE[1:-1]})""", re.IGNORECASE)
 _SPLIT_NUMBER = re.compile(r"^(\d+)(meg|[tgkmunpf])(\d+)(?!\S)", re.IGNORECASE)
 _GLUED = re.compile(r"(?<==)\s*(\d+)(meg|[tgkmunpf])(\d+)(?![\w.])", re.IGNORECASE)
-"""4k7 for 4.7k, as a value and behind a name."""
+"""4k7 for 4.7k: as the first word, and behind an equals sign."""
 _WITHIN = re.compile(
     r"v\s*\([^()]*\)|(?<![\w.$#])(\d+)(meg|[tgkmunpf])(\d+)(?![\w.])", re.IGNORECASE
 )
-"""The same in an expression, but for nodes of such a name."""
-_POINT = re.compile(r"^(\d+)r(\d+)(?!\S)", re.IGNORECASE)
+"""4k7 in an expression. Node names within v(…) are matched first, without groups, to be kept."""
+_POINT = re.compile(r"^(\d+)r(\d+)(?!\S)", re.IGNORECASE)  # 4r7 for 4.7 ohm
 _VALUED = re.compile(r"(?<=\s)value\s*=?\s*(?={)", re.IGNORECASE)
 _TC = re.compile(rf"\btc\s*=\s*{_VALUE}(?:[\s,]+{_VALUE}(?!\s*=))?", re.IGNORECASE)
 _TEMP = re.compile(r"\.(?:temp\b[\s=]*|opt\w*\s(?:.*[\s,])?temp\s*=\s*)(\{[^{}]*\}|[^\s,]+)", re.I)
 _WARMTH = re.compile(r"(?<![\w.])temp(?!\w|\s*[=(])")
 _SYNONYMS = {".params": ".param", ".define": ".param", "cap": "c", "ind": "l"}
 _COMPOUND = re.compile(r"\{([^{}]*[^\w.{}\s][^{}]*)\}")
-"""In B sources ngspice pastes what is in braces without them: ``{a+b}*2``, not ``{(a+b)}*2``."""
+"""A braced expression with an operator. In B sources ngspice drops the braces, so ``{a+b}*2``
+becomes ``a+b*2``; written as ``{(a+b)}*2`` it is right."""
 _EQUAL = re.compile(
     r"(?<![\w.)}\]])((?!time)[a-z_]\w*|\{\w+\})\s*([=!<]=|<>|>(?!=))\s*(\d+\.?\d*)(?![\w.*/^+-])",
     re.I,
 )
 _NEAR = {"==": "(abs({}-{})<1e-9*{})", "<=": "({}-{}<1e-9*{})", ">": "({}-{}>1e-9*{})"}
-"""There it reads a parameter 3 as 3.0000000000000004, which is not 3; 0 is 0."""
+"""Comparisons with a number, with a tolerance: in B sources ngspice rounds parameters, so that 3
+becomes 3.0000000000000004. 0 stays exact."""
 _KIND = re.compile(r"^([efgh]\S*(?:\s+\S+){2}\s+)[vc]c[vc]s\s+(?!.*\b(?:max|min)\s*=)", re.I)
-"""HSPICE's word for what the first letter of a source says."""
+"""VCVS, CCCS and the like: HSPICE's redundant word for the kind of a source without MAX or MIN."""
 _NOISELESS = re.compile(r"\s+noiseless\b", re.IGNORECASE)
+# R, C, L, Q or flux = an expression, in braces or bare with an operator, up to the next key.
 _LAW = re.compile(
     r"([rclq]|flux)\s*=\s*(?:\{([^{}]*)\}|([^={}']*[*/^()][^={}']*?))(?=\s+\w+\s*=(?!=)|$)", re.I
 )
-_OWN = re.compile(r"(?<![\w.])x(?![\w.(])", re.IGNORECASE)
+_OWN = re.compile(r"(?<![\w.])x(?![\w.(])", re.IGNORECASE)  # the part's own voltage or current
 _CHANGING = re.compile(r"\b(?:[vi]\s*\(|time\b)", re.IGNORECASE)
 _MEMORY = re.compile(r"(?<![\w.])(idt|sdt|delay)\s*\(", re.IGNORECASE)
-_COILS = re.compile(r"(k\S*)((?:\s+l\S*){3,})\s+(\S+)", re.IGNORECASE)
+_COILS = re.compile(r"(k\S*)((?:\s+l\S*){3,})\s+(\S+)", re.IGNORECASE)  # K of three or more
 _PWL = re.compile(r"(\bpwl\b[\s(]*)([^()]*)", re.IGNORECASE)
 _WORD = re.compile(r"[^\s,]+")
+# NAME VALUE in a .param line without equals signs.
 _UNEQUAL = re.compile(r"(?<=\s)([a-z_]\w*)\s+(?=[{'\d.+-])", re.IGNORECASE)
 _MODEL = re.compile(r"\.model\s+\S+\s+(?:ako:\s*\S+\s+)?(\w+)", re.IGNORECASE)
 _AKO = re.compile(r"\.model\s+\S+\s+ako:([^\s()]+)", re.IGNORECASE)
-_DEVICES = {"vswitch": "s", "sw": "s", "iswitch": "w", "csw": "w", "d": "d"}
+_DEVICES = {"vswitch": "s", "sw": "s", "iswitch": "w", "csw": "w", "d": "d"}  # their letters
 _SWITCHING = re.compile(rf"\.model\s+(\S+)\s+({'|'.join(_DEVICES)})\b")
 _ODD = word_set("lser vser ilimit revilimit epsilon revepsilon")
 _CARDS = {
@@ -115,14 +121,16 @@ _CARDS = {
     "csw": {"it": "0", "ih": "0", "ron": "1", "roff": "1e12"},
     "d": {"vfwd": "0", "vrev": "1e30", "ron": "1", "roff": "1e12", "rrev": ""},
 }
-"""What these models have if it is not given."""
+"""Default parameters of these models, in the order in which ``_law`` unpacks them."""
 _GATE = {
     "vhigh": "1", "vlow": "0", "ref": "0.5*(vhigh+vlow)", "vt": "0.5", "vh": "0.01", "td": "0",
     "trise": "0", "tfall": "0", "tau": "0", "rout": "1", "cout": "0", "tripdt": "", "tripv": "",
 }  # fmt: skip
 _CURRENT = re.compile(rf"\bi\s*\(\s*(l[^\s()]*)\s*\)\s*=\s*{_VALUE}[\s,]*", re.IGNORECASE)
-_UNSIGNED = ("", *"0123456789.")  # no base, or a number, perhaps behind an exponent
+# First characters of bases whose powers stay: none, or a positive number (of 1e-3 the 3 is seen).
+_UNSIGNED = ("", *"0123456789.")
 _NAMING = re.compile(r"[\w.$#]")
+# An operator, a sign, and the exponent: group 3 has it if it is even, else it is a name or number.
 _POWER = re.compile(r"(\s*(?:\*\*|\^)\s*)([+-]?)(?:(\d*[02468])(?![\w.])|[\w.]*)")
 _LOGIC = re.compile(r"(?<!&)&(?!&)|(?<!\|)\|(?!\|)|~")
 _LOGICAL = {"&": "&&", "|": "||", "~": "!"}
@@ -136,11 +144,12 @@ _TRUTH = re.compile(
 
 
 def _pointed(expression: str) -> str:
+    """4k7 as 4.7k throughout an expression, node names kept."""
     return _WITHIN.sub(lambda m: f"{m[1]}.{m[3]}{m[2]}" if m[1] else m[0], expression)
 
 
 def in_ngspice(line: Line) -> list[Line]:
-    """The line as ngspice knows it, in one line or more."""
+    """The line in ngspice's dialect, as one or more lines."""
     text = _KIND.sub(r"\1", _NOISELESS.sub("", line.text.translate(_LETTERS)))
     text = _without_tables(text)
     kind, word = text[:1].lower(), text[:4].lower()
@@ -161,12 +170,13 @@ def in_ngspice(line: Line) -> list[Line]:
         text = re.sub(r"\{[^{}]*\}", lambda braced: _pointed(braced[0]), text)
     if kind in "beg":
         text = _EQUAL.sub(_compared, text)
+        # Only where some braced expression is not already one pair of parentheses.
         if any(each[0] != "(" or closing(each, 0) < len(each) for each in _COMPOUND.findall(text)):
             text = text.replace("{", "{(").replace("}", ")}")
     if kind in "rclvibefgh":
         *parts, own = _with_parts(text, kind)
         own = _source(own) if kind in "efgh" else own
-        split = _with_memory if kind in "beg" else _with_law if kind in "rcl" else lambda one: [one]
+        split = _with_memory if kind in "beg" else _with_law if kind in "rcl" else lambda own: [own]
         found = [*parts, *split(own)]
     elif kind == "a":
         found = _gate(text)
@@ -191,8 +201,8 @@ def in_ngspice(line: Line) -> list[Line]:
 
 
 def prelude(lines: Sequence[Line]) -> list[Line]:
-    """The functions and constants of theirs that the lines use and do not define."""
-    called: dict[str, set[int]] = {}
+    """Definitions of the foreign functions and constants that the lines use but do not define."""
+    called: dict[str, set[int]] = {}  # numbers of arguments by name
     defined, temperature = set[str](), "27"
     for line in lines:
         text = line.text.lower()
@@ -221,9 +231,9 @@ def prelude(lines: Sequence[Line]) -> list[Line]:
 
 
 def in_ngspice_together(lines: Sequence[Line]) -> list[Line]:
-    """What takes more than one line to read: models that are a kind of another (``ako:``), switches
-    and diodes of other programs as B sources, and currents of inductors in ``.ic``. Where a model
-    is not theirs to the letter a line ``.told`` says so. Raises BadInput."""
+    """Translates what spans several lines: models derived from another (``ako:``), switches and
+    diodes of other programs as B sources, and currents of inductors in ``.ic``. Where a model only
+    approximates the original, a line ``.told`` says so to the user. Raises BadInput."""
     scopes, lines = [*_scopes(lines)], [*lines]
     _complete(lines, scopes)
     known: dict[_Key, str] = {}
@@ -243,13 +253,15 @@ def in_ngspice_together(lines: Sequence[Line]) -> list[Line]:
 
 
 def _apart(line: Line, scope: tuple[int, ...], known: Mapping[_Key, str]) -> list[Line]:
-    """A switch or a diode by its law, an inductor with the current that it has at first."""
+    """The lines of an element: a switch or diode as a B source by its model's law, an inductor with
+    the initial current that ``known`` has for it, any other as it is."""
     name, *rest = words(line.text) if line.text[:1].lower() in {*"swdl"} else [""]
     count = {"s": 4, "w": 3}.get(name[:1], 2)
     law = _nearest(known, scope, name[:1], rest[count]) if len(rest) > count else None
     texts, (plus, minus, *control) = [line.text], rest[:count] if law else ["", ""]
     if (scope, name) in known and len(rest) > 2:
-        # At the operating point its error is a voltage of a gigavolt an ampere, then nothing.
+        # At the operating point a source in series, of 1 GV per ampere of error, holds the current;
+        # during the run its voltage is 0.
         error = f"1e9*(i(v{name}_ic)-({known[scope, name]}))"
         texts = [
             " ".join([name, rest[0], f"{name}_ic", *rest[2:]]),
@@ -267,16 +279,16 @@ def _apart(line: Line, scope: tuple[int, ...], known: Mapping[_Key, str]) -> lis
 
 
 def _nearest(known: Mapping[_Key, Any], scope: tuple[int, ...], *key: str) -> Any:
-    """What the name means in this scope: of the innermost one that has it."""
+    """The value of a key in the innermost enclosing scope that has it; None without any."""
     about = ((scope[:depth], *key) for depth in range(len(scope), -1, -1))
     return next((known[each] for each in about if each in known), None)
 
 
 def _complete(lines: list[Line], scopes: Sequence[tuple[int, ...]]) -> None:
-    """Put all parameters into each model that is a kind of another one."""
-    own: dict[_Key, int] = {}
+    """Write out each model derived by ``ako:`` with the parameters that it inherits."""
+    own: dict[_Key, int] = {}  # places of models; -1 where a scope has two of the same name
     for place, (line, scope) in enumerate(zip(lines, scopes, strict=True)):
-        if _MODEL.match(line.text):  # of two of a name neither is meant
+        if _MODEL.match(line.text):
             key = scope, words(line.text)[1]
             own[key] = -1 if key in own else place
 
@@ -292,8 +304,8 @@ def _complete(lines: list[Line], scopes: Sequence[tuple[int, ...]]) -> None:
         if rest and "=" not in rest[0] and rest.pop(0) != kind:
             refuse(lines[place], f"{shown(match[1])} is of type {kind}; write all of the model")
         keys = {word.partition("=")[0] for word in rest}
-        kept = (word for word in given if word.partition("=")[0] not in keys)
-        text = " ".join([".model", name, kind, *kept, *rest])
+        inherited = (word for word in given if word.partition("=")[0] not in keys)
+        text = " ".join([".model", name, kind, *inherited, *rest])
         lines[place] = replace(lines[place], text=text)
 
     for place in range(len(lines)):
@@ -301,7 +313,7 @@ def _complete(lines: list[Line], scopes: Sequence[tuple[int, ...]]) -> None:
 
 
 def _scopes(lines: Sequence[Line]) -> Iterator[tuple[int, ...]]:
-    """For each line the places of the .subckt lines about it, the outermost first."""
+    """For each line the places of the .subckt lines that enclose it, the outermost first."""
     scope: tuple[int, ...] = ()
     for place, line in enumerate(lines):
         word = line.text.split(None, 1)[0].lower()
@@ -313,10 +325,12 @@ def _scopes(lines: Sequence[Line]) -> Iterator[tuple[int, ...]]:
 
 
 def _law(line: Line, kind: str) -> tuple[str, str]:
-    """Of a model that ngspice lacks what a function of ours takes, and what is to be told of it."""
+    """The parameters that ``cosim_switch`` or ``cosim_diode`` take for a model that ngspice lacks,
+    and a remark for the user. Both are empty where ngspice has the model itself."""
     given = _taken(line.text, _CARDS[kind])[1]
     first, second, ron, roff, *rrev = (_CARDS[kind] | given).values()
     odd = {key for key, value in _taken(line.text, _ODD)[1].items() if number(value) != 0.0}
+    # Chained: both thresholds are plain numbers, and equal.
     told, same = "", number(first) == number(second) is not None
     if kind == "d":
         if not given or odd - {"epsilon", "revepsilon"}:
@@ -334,14 +348,15 @@ def _law(line: Line, kind: str) -> tuple[str, str]:
 
 
 def _taken(text: str, keys: Collection[str]) -> tuple[str, dict[str, str]]:
-    """The text without the assignments to these keys, and what they are."""
+    """The text without the assignments to these keys, and their values."""
     given = {match[1].lower(): match[2] for match in _PAIR.finditer(text)}
     less = _PAIR.sub(lambda match: "" if match[1].lower() in keys else match[0], text)
     return less, {key: value for key, value in given.items() if key in keys}
 
 
 def _without_tables(text: str) -> str:
-    """Calls of ``table`` as the straight lines that they mean, innermost first."""
+    """Calls of ``table`` rewritten as ``pwl``, the last one first, so that inner calls precede
+    outer ones."""
     if text[:1].lower() in "eg":
         text = re.sub(r"(?i)(?<=\s)table\s*=\s*", "table ", text)  # the source's own, see below
     for match in [*_TABLE.finditer(text)][:_MOST][::-1]:
@@ -354,18 +369,19 @@ def _without_tables(text: str) -> str:
 
 
 def _compared(match: re.Match[str]) -> str:
+    """A match of ``_EQUAL`` as a comparison with a tolerance."""
     parameter, how, value = match.groups()
-    law = _NEAR.get(how, "(abs({}-{})>1e-9*{})")
+    law = _NEAR.get(how, "(abs({}-{})>1e-9*{})")  # of != and <>
     return law.format(parameter, value, value) if float(value) else match[0]
 
 
 def _powers(text: str) -> str:
-    """``x**y`` as ``pow(x,y)`` unless y is an even number: ngspice raises the magnitude of x.
-    Between comparisons ``^`` is LTspice's and PSpice's exclusive or."""
+    """``x**y`` as ``pow(x,y)`` unless y is an even number, since ngspice's ``**`` raises the
+    magnitude of x. Between comparisons ``^`` is the exclusive or of LTspice and PSpice."""
     place = 0
     while match := _POWER.search(text, place):
         start = place = match.start()
-        depth = 0
+        depth = 0  # Backwards to the start of the base: a name, number, bracket or call.
         while start and (depth or text[start - 1] in ")}" or _NAMING.match(text[start - 1])):
             start -= 1
             depth += (text[start] in ")}") - (text[start] in "({")
@@ -384,7 +400,8 @@ def _powers(text: str) -> str:
 
 
 def _lines(x: str, points: list[str]) -> str | None:
-    """An expression for straight lines between points, level outside; None if they are none."""
+    """An expression for straight lines between the points x, y, x, y, …, constant outside; None
+    where they are too few, no pairs or do not rise in x."""
     known = [number(point) for point in points[::2]]
     rising = all(a is None or b is None or a < b for a, b in pairwise(known))
     if len(points) < 4 or len(points) % 2 or not rising:
@@ -393,7 +410,8 @@ def _lines(x: str, points: list[str]) -> str | None:
 
 
 def _with_parts(text: str, kind: str) -> Iterator[str]:
-    """An element without ratings, behind its parasitic parts as elements of their own."""
+    """The parasitic parts of an element as elements of their own, then the element without them
+    and without ratings."""
     parts = _PARASITES.get(kind, frozenset())
     less, given = _taken(text, parts | _REMARKS.get(kind, frozenset()))
     given = {key: value for key, value in given.items() if key in parts and number(value) != 0.0}
@@ -409,7 +427,7 @@ def _with_parts(text: str, kind: str) -> Iterator[str]:
         rest = _SPLIT_NUMBER.sub(r"\1.\3\2", rest)
         rest = _POINT.sub(r"\1.\2", rest) if kind == "r" else rest
         rest = _TC.sub(lambda tc: f"tc1={tc[1]} tc2={tc[2] or 0}", rest)
-    at = plus
+    at = plus  # the node to which the next part in series is connected
     for key in ("rser", "lser"):
         if key in given:
             yield f"{key[0]}{name}_{key} {at} {name}_{key} {given[key]}"
@@ -423,13 +441,15 @@ def _with_parts(text: str, kind: str) -> Iterator[str]:
 
 
 def _with_law(text: str) -> Iterator[str]:
-    """A part whose value is an expression of its own voltage x, or current x, in braces."""
+    """An R, C or L whose value is an expression: in braces, and with its own voltage or current,
+    which LTspice calls x, written out."""
     name, plus, minus, rest = [*text.strip().split(None, 3), "", "", ""][:4]
     law = _LAW.match(rest)
     if law is None:
         yield text
     elif (key := law[1].lower()) == "flux" and name[0] in "lL":
-        # The voltage of a node is the current, a charge there the flux.
+        # A gyrator: the voltage of node NAME_i is the coil's current, the charge of a capacitor
+        # there is its flux.
         yield f"g{name}_flux {plus} {minus} {name}_i 0 1"
         yield f"g{name}_x 0 {name}_i {plus} {minus} 1"
         value = _OWN.sub(f"v({name}_i)", law[2] or law[3])
@@ -441,9 +461,10 @@ def _with_law(text: str) -> Iterator[str]:
 
 
 def _with_memory(text: str) -> Iterator[str]:
-    """A source behind what integrates or delays for it: a capacitor of 1 F, a line of 1 Ohm."""
+    """A source whose idt, sdt and delay are computed by elements before it: each integral by a
+    capacitor of 1 F, each delay by a matched line of 1 Ohm."""
     for place in range(_MOST):
-        match = [*_MEMORY.finditer(text, text.find("=") + 1)][-1:]  # what lies within comes first
+        match = [*_MEMORY.finditer(text, text.find("=") + 1)][-1:]  # the last: inner calls first
         if not match or len(text) > MAX_LINE // 2 or "=" not in text:
             break
         start, what, after = match[0].start(), match[0][1].lower(), match[0].end()
@@ -466,10 +487,10 @@ def _with_memory(text: str) -> Iterator[str]:
 
 
 def _gate(text: str) -> list[str]:
-    """LTspice's gate, Schmitt trigger or flip-flop: a switch whose control is above the middle of a
-    hysteresis (an AND's its least input), a delay, an edge of 1 ns or more, and for each output a
-    source. One with a clock has two capacitors: the data's, and what follows that while the clock
-    is high. Inputs at the common node are none."""
+    """LTspice's gate, Schmitt trigger or flip-flop, as a chain: a switch with hysteresis, closed
+    while the control is above the middle (an AND's control is its lowest input), a delay, an edge
+    of 1 ns or more, and a source for each output. A clocked flip-flop stores its state on two
+    capacitors. Inputs at the common node count as not connected."""
     less, given = _taken(text, _GATE)
     name, *nodes = less.lower().split()
     if len(nodes) != 9:
@@ -478,6 +499,7 @@ def _gate(text: str) -> list[str]:
     law = {key: "(" + value.strip("{}'") + ")" for key, value in (_GATE | given).items()}
     ref = re.sub("v(?:high|low)", lambda match: law[match[0]], law["ref"])
     x = [f"v({each},{common})" for each in inputs if each != common]
+    # Control y of the switch, middle and half width of its hysteresis.
     middle, half, y = ref, "0", x[0] if x else ""
     first: list[str] = []
     if kind in ("and", "or") and x:
@@ -493,11 +515,12 @@ def _gate(text: str) -> list[str]:
             f"v({inputs[place]},{common})>{ref}" if inputs[place] != common else "0>1"
             for place in (0, 3, 4)
         )
-        # Two capacitors: w takes the data while the clock is low, s takes w while it is high. Each
-        # holds its voltage by no current: to compare it with a half instead has two solutions.
-        up, one, y = f"v({name}_c_p)>0.5", f"v({name}_w)>0.5", f"v({name}_s)"
+        # Master w follows the data while the clock is low, slave s follows w while it is high. Each
+        # holds its voltage without any current; a source that compares it with 0.5 instead would
+        # have two solutions at the operating point.
+        up, master, y = f"v({name}_c_p)>0.5", f"v({name}_w)>0.5", f"v({name}_s)"
         first = _held(f"{name}_c", f"v({inputs[2]},{common})", ref, "0")
-        for each, taken, follows in (("w", f"1-({up})", data), ("s", up, one)):
+        for each, taken, follows in (("w", f"1-({up})", data), ("s", up, master)):
             own = f"v({name}_{each})"
             aim = f"({taken}) ? (({follows}) ? 1 : 0)-{own} : 0"
             aim = f"{clear} ? 0-{own} : ({preset} ? 1-{own} : ({aim}))"
@@ -506,6 +529,7 @@ def _gate(text: str) -> list[str]:
         middle = "0.5"
     elif kind != "buf" or len(x) != 1:
         return [text]
+    # The switch of 1 Ohm and its load of 1 kOhm divide 1 V by 1.001.
     state, td = f"1.001*v({name}_p)", law["td"][1:-1]
     state = state if number(td) == 0.0 else f"delay({state},{{{td}}})"
     found = [
@@ -525,8 +549,8 @@ def _gate(text: str) -> list[str]:
 
 
 def _held(name: str, y: str, middle: str, half: str) -> list[str]:
-    """A node that is 1 from where y rises through the middle and a half of a hysteresis, and 0 from
-    where it falls through the other end."""
+    """Elements of a node NAME_p that goes to 1 V where y rises through ``middle`` + ``half``, and
+    to 0 where it falls through ``middle`` - ``half``."""
     return [
         f"b{name}_x {name}_x 0 v={y}",
         f"s{name} {name}_1 {name}_p {name}_x 0 {name}_m",
@@ -537,7 +561,7 @@ def _held(name: str, y: str, middle: str, half: str) -> list[str]:
 
 
 def since_the_start(points: list[str]) -> str:
-    """The points of PWL, times since the last one (``+1u``) as such since the start."""
+    """The points of PWL, with times relative to the last point (``+1u``) made absolute."""
     found, last = [*points], 0.0
     for place, text in enumerate(points):
         if (value := number(text)) is None:
@@ -551,7 +575,7 @@ def since_the_start(points: list[str]) -> str:
 
 
 def _source(text: str) -> str:
-    """A controlled source; a polynomial or a table as B source, of its name after a B."""
+    """A controlled source; a polynomial or a table as a B source with "b" before its name."""
     name, *found = words(text)
     kind = name[0]
     nodes, rest = found[:2], found[2:]
@@ -566,14 +590,15 @@ def _source(text: str) -> str:
 
 
 def _polynomial(found: list[str], kind: str) -> str | None:
-    """The expression of ``POLY(n)``, controls, coefficients; None if it is none."""
+    """The expression of the words ``poly``, n, controls and coefficients; None where they are none.
+    The coefficients' order is SPICE's: constant, x, y, …, x·x, x·y, …, y·y, …"""
     if len(found) < 2 or not re.fullmatch(r"[1-9]\d?", found[1]):
         return None
     dimension, each = int(found[1]), 2 if kind in "eg" else 1
     read, factors = found[2 : 2 + each * dimension], found[2 + each * dimension :]
     if any("=" in word for word in found) or not 1 + (dimension == 1) <= len(factors) <= _MOST:
         return None  # of one coefficient programs disagree whether it is the constant
-    pairs = zip(*[iter(read)] * each, strict=True)
+    pairs = zip(*[iter(read)] * each, strict=True)  # groups of ``each`` consecutive words
     inputs = [f"{'v' if each == 2 else 'i'}({','.join(names)})" for names in pairs]
     degrees = (combinations_with_replacement(inputs, degree) for degree in count())
     terms = [
