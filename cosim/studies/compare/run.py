@@ -40,8 +40,8 @@ class Comparison:
     @property
     def numbers(self) -> dict[str, float | None]:
         """All numbers by name; SI but for ``_mm`` and ``_percent``. A score's bare name is the
-        run's; with ``_ceiling``, ``_no_motion`` and ``_straight_line`` it is that of a reference that
-        needs no model."""
+        run's; with ``_ceiling``, ``_no_motion`` or ``_straight_line`` it is that of a reference
+        without a model."""
         return {number.name: number.value for number in self.found.numbers}
 
     def plot(self) -> Picture:
