@@ -1,4 +1,4 @@
-"""What was measured where a built-in scene was: statistics of the ten published trials.
+"""Measured numbers beside those of a built-in scene: statistics of the ten published trials.
 
 Source: the trials tracked by C. Yako, J. Nowak, S. Yuan and K. Salisbury, repository
 clyako/vertical-vibratory-transport-of-grasped-parts-using-impacts. ``measured.csv`` holds, in SI,
@@ -18,8 +18,8 @@ OF_PAPER = 9
 
 
 def measured(scene: Scene) -> tuple[int, dict[str, float]] | None:
-    """The trial's number and its statistics, by the names of a run's summary; None where a scene is
-    none of the trials', or differs in more than its circuit's model and what a run writes down."""
+    """The trial's number and its statistics, by the names of a run's summary. None for a scene that
+    repeats no trial, or whose drive, coil, mechanics or friction was changed."""
     found = re.fullmatch(r"trial-(\d\d)", scene.name)
     number = OF_PAPER if scene.name == "paper" else int(found[1]) if found else None
     if number not in _table() or _moved(scene) != _moved(load(scene.name)):
@@ -32,7 +32,7 @@ def measured(scene: Scene) -> tuple[int, dict[str, float]] | None:
 
 
 def _moved(scene: Scene) -> dict[str, object]:
-    """What decides how the machine moves, its circuit's accuracy and coupling apart."""
+    """The tables that determine the motion, but for circuit model, accuracy and coupling."""
     tables = scene.as_dict()
     return {name: tables[name] for name in ("drive", "coil", "mechanics", "friction")}
 

@@ -1,4 +1,4 @@
-"""Numbers published with the ten tracked trials, by which `cosim fit` measures and compares.
+"""Numbers published with the ten tracked trials, which `cosim fit` uses and compares with.
 
 Source: C. Yako, J. Nowak, S. Yuan, K. Salisbury, *Vertical Vibratory Transport of Grasped Parts
 Using Impacts*, and `matlab/parameter_estimation.m` of the repository
@@ -14,7 +14,7 @@ MU_K = 0.59  # measured
 MU_K_FITTED = 0.6234
 
 TRIALS = tuple(f"Trial #{n}" for n in range(1, 11))
-"""The names of their files."""
+"""The names of the trials' files, without an ending."""
 FORCES_MEASURED = (11.089, 16.901, 5.278, 5.278, 5.278, 5.278, 5.278, 5.278, 5.278, 22.841)
 FORCES_FITTED = (
     *(10.6500, 13.0009, 9.9833, 6.7872, 6.0413),

@@ -1,4 +1,4 @@
-"""What was measured of a machine, whatever its instruments: a camera, a vibrometer, a scope."""
+"""Measurements of a machine by any instrument: a camera, a vibrometer, a scope."""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,20 +14,20 @@ from cosim.trials.table import HOW, WORDS, read_table
 from cosim.trials.tracked import track
 
 DIGITS = 6e-7, 6e-9
-"""Of a published trial's times, s: seven digits, and eight places; relative and absolute."""
+"""Rounding of a published trial's times: relative (seven digits), and absolute in s."""
 
 GAP = 1.5
-"""Of the median step, from which on a step is a gap."""
+"""A step of the times is a gap from so many times the median step on."""
 
 EVEN = 1.1
-"""The longest step over the shortest, up to which times count as even."""
+"""Greatest ratio of the longest to the shortest step of times that count as even."""
 
 
 @dataclass(frozen=True)
 class Recording:
     """``signals`` over ``time`` (s, from the first row on) by waveforms' names, SI; NaN if unknown.
 
-    Where there are heights there are velocities too: Tracker's, or differences as it makes them.
+    Each body with heights has velocities, too: Tracker's, or differences like Tracker's.
     """
 
     name: str
@@ -36,13 +36,14 @@ class Recording:
     v_across: Array
     """Horizontal velocity of the surface, m/s; NaN where it was not tracked."""
     notes: tuple[str, ...]
-    """What was taken for granted or left out, a sentence each."""
+    """A sentence for each assumption, flaw and left-out column."""
     understood: dict[str, Any] = field(default_factory=dict)
-    """What was made of the file, for a JSON file: ``rows``, ``span`` (s), ``rate`` (1/s), ``gaps``
-    (sentences), and for each of ``columns`` its header, unit, and how many values are missing."""
+    """How the file was read, for a JSON file: ``rows``, ``span`` (s), ``rate`` (1/s), ``gaps``
+    (sentences), and for each of ``columns`` its header, unit, whether the unit is assumed, and the
+    number of missing values."""
 
     def rows(self, chosen: slice) -> "Recording":
-        """Some of the rows; time 0 is the first of them."""
+        """The recording with the ``chosen`` rows only; its time starts at 0 again."""
         return replace(
             self,
             time=self.time[chosen] - self.time[chosen][0],
@@ -51,28 +52,28 @@ class Recording:
         )
 
     def told(self) -> list[str]:
-        """What was understood, in lines."""
+        """Lines to print on how the file was read."""
         read = self.understood
         if not read:
             return []
         size = f"{read['rows']} rows, {read['span']:.4g} s, {read['rate']:.4g} rows/s"
         lines, others = [f"Read from {plain(self.name)}: {size}"], []
-        for name, one in read["columns"].items():
-            header = plain(one["header"], 40)
+        for name, column in read["columns"].items():
+            header = plain(column["header"], 40)
             if name not in WORDS:
                 others.append(header)
                 continue
-            whence = " (the published trials' unit)" if one["assumed"] else ""
-            gone = f", {one['missing']} missing" if one["missing"] else ""
-            lines.append(f"  {name:<17} {header}, in {one['unit']}{whence}{gone}")
+            whence = " (the published trials' unit)" if column["assumed"] else ""
+            gone = f", {column['missing']} missing" if column["missing"] else ""
+            lines.append(f"  {name:<17} {header}, in {column['unit']}{whence}{gone}")
         if others:
             lines.append(f"  not compared: {', '.join(others)}")
         return lines + [f"  {sentence}" for sentence in read["gaps"]]
 
 
 def read_recording(path: Path, asked: str = "") -> Recording:
-    """One recording; ``asked`` as :func:`read_table` has it. Raises BadInput, with file, row and
-    column, for what is wrong with it.
+    """The recording in a file; ``asked`` as for :func:`read_table`. Raises BadInput, with file, row
+    and column.
 
     Without a time column the rows are frames of the published trials' camera, and a note says so.
     """
@@ -81,7 +82,7 @@ def read_recording(path: Path, asked: str = "") -> Recording:
     time = frame_times(0.0, count)
     if "time" in table.columns:
         written = table.columns["time"] - table.columns["time"][0]
-        if not np.allclose(written, time, *DIGITS):  # rounded times of even frames are made even
+        if not np.allclose(written, time, *DIGITS):  # else even frames, whose times are rounded
             time = written
     else:
         notes += (f"No time column: read at {FRAME_RATE:g} frames/s, as the published trials are.",)
@@ -90,9 +91,9 @@ def read_recording(path: Path, asked: str = "") -> Recording:
         raise BadInput(" ".join([f"{plain(path)}: no column to compare: {HOW}.", *table.notes]))
     for body in ("surface", "part"):
         if f"z_{body}" in signals:
-            there = track(signals | {"time": time}, body).v
-            if f"v_{body}" in signals or np.isfinite(there).any():
-                signals[f"v_{body}"] = there
+            velocity = track(signals | {"time": time}, body).v
+            if f"v_{body}" in signals or np.isfinite(velocity).any():
+                signals[f"v_{body}"] = velocity
     for name, values in signals.items():
         if np.isfinite(values).sum() < 2:
             where = f"{plain(path)}: column {plain(table.headers[name], 40)}"
@@ -115,14 +116,14 @@ def read_recording(path: Path, asked: str = "") -> Recording:
 
 
 def _gaps(time: Array) -> list[str]:
-    """What is to be told of times (s) that are not even."""
+    """Sentences on the gaps of times (s), or else on their being uneven."""
     steps = np.diff(time)
     usual = float(np.median(steps))
     gaps = np.flatnonzero(steps > GAP * usual)
     if not len(gaps):
         apart = f"{steps.min() * 1e3:.3g} to {steps.max() * 1e3:.3g} ms apart"
-        told = f"Rows are {apart}: if these times are rounded, so are the velocities."
-        return [told] if steps.max() > EVEN * steps.min() else []
+        sentence = f"Rows are {apart}: if these times are rounded, so are the velocities."
+        return [sentence] if steps.max() > EVEN * steps.min() else []
     longest = int(np.argmax(steps))
     return [
         f"Gaps in time: {len(gaps)}, the longest of {steps[longest] * 1e3:.3g} ms at "

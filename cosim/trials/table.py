@@ -1,4 +1,4 @@
-"""Reading tables of what was measured: columns by their names and units, in SI.
+"""Reading tables of measurements: columns by their names and units, in SI.
 
 Three forms are read, with commas, semicolons or tabs between the cells:
 
@@ -8,8 +8,8 @@ Three forms are read, with commas, semicolons or tabs between the cells:
 - what Tracker (physlets.org/tracker) exports for several tracks: lines that begin with ``#``, a
   line with the tracks' names, and a line ``t x y v_{y} …`` with their columns; y is the height.
 
-The last two are in s and mm where no unit is given. Any other table must say its units, and which
-column is what, in its header or by ``MAP``: nothing is guessed. Empty cells, ``nan``, ``?`` and
+The last two are in s and mm where no unit is given. Any other table must name its quantities and
+units, in its header or by ``MAP``: nothing is guessed. Empty cells, ``nan``, ``?`` and
 U+FFFD (Tracker's mark for a missing value, in an encoding that was lost) stand for no value.
 """
 
@@ -27,14 +27,14 @@ from cosim.files.cells import Cells, read_cells
 
 Notes = tuple[str, ...]
 
-MISSING = {"", "nan", "?"}  # once U+FFFD is gone
+MISSING = {"", "nan", "?"}  # cells without a value, after U+FFFD is stripped
 SHORTEST, LONGEST = 1e-9, 1e3
-"""s between rows, on average."""
+"""Bounds of the mean time between rows, s."""
 
 FEWEST_ROWS = 8
 
 MOST = 1e9
-"""Of any value, SI: squares of these have room."""
+"""Largest magnitude of a value, SI: sums of squares cannot overflow."""
 
 WORDS = {
     "time": ("time",),
@@ -53,7 +53,7 @@ UNDERSTOOD = "; ".join(" or ".join(words) for words in WORDS.values()) + (
     "voltage [V]; and the columns t, xp, zp, vzp, xo, zo, vzo … of tracked trials"
 )
 MAP = "surface=NAME[:unit],part=NAME[:unit],time=NAME[:unit]"
-"""Which column of a table is what; the unit may stand in the header instead."""
+"""The form of the assignment of columns; a unit may stand in the header instead."""
 HOW = (
     "write what each is and its unit, such as time [s], surface [mm], part [mm], or, to compare, "
     "name the columns, such as --columns time=t:s,surface=top:mm,part=cube:mm"
@@ -66,15 +66,16 @@ TRIALS = {"t": "time"} | {
 }
 """Columns of the published trials."""
 PUBLISHED, BESIDE = {"t", "zp", "zo"}, {"xp", "xo", "zs"}
-"""Those by which such a trial is known, and one of the others: then it needs no units."""
+"""A table with all of the first and one of the second is a published trial, and needs no units."""
 UNUSED = {f"{quantity}{letter}" for quantity in ("x", "ax") for letter in BODIES}
-"""Columns of the published trials that say nothing of the vertical motion."""
+"""Columns of the published trials that have no part in the vertical motion."""
 
 TRACKS = {
     "p": ("p", "platform", "surface"),
     "o": ("o", "part", "object"),
     "s": ("s", "spring", "spring-loaded plate", "spring plate"),
 }
+"""Names of Tracker's tracks for each body's letter."""
 QUANTITIES = {"y": "z", "z": "z", "vy": "vz", "vz": "vz", "ay": "az", "az": "az"}
 
 KINDS = {"time": "s", "z": "m", "v": "m/s", "a": "m/s2", "current": "A", "coil_voltage": "V"}
@@ -89,20 +90,20 @@ IN_TRIALS = {"z": "mm", "v": "mm/s", "a": "mm/s2"}
 
 @dataclass(frozen=True)
 class Column:
-    """Where a column stands, what its header says, its unit, and what brings that to SI."""
+    """A column: its index, its header, its unit and the factor from this to SI."""
 
     place: int
     header: str
     unit: str
     factor: float
     assumed: bool
-    """The unit is that of the published trials: the table does not say it."""
+    """Whether the unit is that of the published trials, as the table gives none."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """``columns`` by the names of the waveforms, and of ``TRIALS``, SI, NaN where nothing is known;
-    ``known``: where they are from; ``notes``: what was left out."""
+    """``columns`` by the names of waveforms and of ``TRIALS``, SI, NaN where unknown; ``known``:
+    each one's column in the file; ``notes``: what was left out; ``lines``: numbers of the rows."""
 
     columns: dict[str, Array]
     known: dict[str, Column]
@@ -111,15 +112,15 @@ class Table:
 
     @property
     def headers(self) -> dict[str, str]:
-        """The headers as they are written."""
+        """The headers in the file, by the names of the columns."""
         return {name: column.header for name, column in self.known.items()}
 
 
 def read_table(path: Path, asked: str = "") -> Table:
-    """The table of a file; its time, where it has one, increases from row to row. ``asked`` says
-    which column is what, as ``MAP`` does, before the header's own words.
+    """The table in a file; its time, where it has one, increases from row to row. ``asked``, in the
+    form of ``MAP``, assigns columns, and has precedence over the names in the header.
 
-    Raises BadInput, with file, row and column, for what is wrong with it, or is not clear.
+    Raises BadInput, with file, row and column, for errors and ambiguities.
     """
     cells = read_cells(path)
     tracker = any(line.startswith("#multi:") for line in cells.comments)
@@ -155,7 +156,7 @@ def read_table(path: Path, asked: str = "") -> Table:
 
 
 def _header(cells: Cells, tracker: bool, asked: str) -> tuple[dict[str, Column], int, Notes]:
-    """The known columns, how many rows the header has, and notes on what was left out."""
+    """The known columns, the number of header rows, and notes on what was left out."""
     table, path = cells.rows, cells.name
     (line, head), heads = table[0], 1
     where = f"{path}: row {line}"
@@ -166,7 +167,7 @@ def _header(cells: Cells, tracker: bool, asked: str) -> tuple[dict[str, Column],
     split = [_split(cell) for cell in head]
     words = {written for written, _ in split}
     published = heads == 2 or (words >= PUBLISHED and words & BESIDE)
-    # Of p, s and o only the last is clear alone: p may be the part, s the surface.
+    # Without the others, p may mean the part and s the surface; o alone is clear.
     bodies = {word[-1] for word in words & TRIALS.keys() if word != "t"}
     clear = published or bodies <= {"o"} or bodies >= {"p", "o"}
     chosen = _chosen(where, asked, head)
@@ -176,7 +177,7 @@ def _header(cells: Cells, tracker: bool, asked: str) -> tuple[dict[str, Column],
     for place, (cell, (written, unit)) in enumerate(zip(head, split, strict=True)):
         letters = TRIALS.get(written)
         name, given = chosen.get(place, (letters or _WORDS.get(written.lower()), ""))
-        if name is None or (place not in chosen and name in (one for one, _ in chosen.values())):
+        if name is None or (place not in chosen and name in (word for word, _ in chosen.values())):
             unknown += [cell] if cell and written not in UNUSED else []
             continue
         unit, assumed = given or unit, False
@@ -198,7 +199,7 @@ def _header(cells: Cells, tracker: bool, asked: str) -> tuple[dict[str, Column],
         cells_said = ", ".join(plain(cell, 40) for cell in unclear[:12])
         raise BadInput(f"{where}: what {cells_said} is, or its unit, is not clear: {HOW}.")
     if not known:
-        # What is no table may be any file, of which nothing is to be told.
+        # A file that is no table may be private, so its words are not printed.
         numeric = [cell for _, row in table[heads : heads + 2] for cell in row if cell]
         table_like = numeric and all(re.match(r"[+-]?[.,]?\d", cell) for cell in numeric)
         found = left_out if table_like and left_out else "none"
@@ -214,12 +215,12 @@ def _header(cells: Cells, tracker: bool, asked: str) -> tuple[dict[str, Column],
 
 
 def _chosen(where: str, asked: str, head: list[str]) -> dict[int, tuple[str, str]]:
-    """What ``MAP`` says: for the places of columns the name of a waveform, and the unit or ""."""
+    """The assignment ``asked``: for indices of columns the waveform's name, and the unit or ""."""
     found: dict[int, tuple[str, str]] = {}
     for item in filter(None, re.split(r",(?=[\w ]+=)", asked)):
         word, _, column = item.partition("=")
         name, column = _WORDS.get(_bare(word).lower()), column.strip()
-        if name is None or not column or name in (one for one, _ in found.values()):
+        if name is None or not column or name in (taken for taken, _ in found.values()):
             raise BadInput(
                 f"--columns {plain(item, 60)}: write {MAP}, each once; besides these three "
                 "v_surface, v_part, current, voltage, command."
@@ -230,15 +231,15 @@ def _chosen(where: str, asked: str, head: list[str]) -> dict[int, tuple[str, str
             alike = (column, _bare(column))
             places = [p for p, cell in enumerate(head) if cell in alike or _split(cell)[0] in alike]
         if len(places) != 1 or places[0] in found:
-            there = ", ".join(plain(cell, 40) for cell in head[:20])
+            headers = ", ".join(plain(cell, 40) for cell in head[:20])
             few = "there is no column" if not places else "not one column of its own is"
-            raise BadInput(f"{where}: --columns: {few} {plain(column, 40)} (found: {there}).")
+            raise BadInput(f"{where}: --columns: {few} {plain(column, 40)} (found: {headers}).")
         found[places[0]] = name, unit.strip()
     return found
 
 
 def _bare(name: str) -> str:
-    """Tracker's v_{y} as vy, coil_voltage as coilvoltage."""
+    """A name without _, {}, - and spaces: Tracker's v_{y} as vy, coil_voltage as coilvoltage."""
     return re.sub(r"[_{}\s-]", "", name)
 
 
@@ -246,7 +247,7 @@ _WORDS = {_bare(word): name for name, words in WORDS.items() for word in words}
 
 
 def _split(cell: str) -> tuple[str, str]:
-    """A bare name, and the unit behind it in brackets."""
+    """A header cell's bare name, and the unit behind it in brackets or ""."""
     name, _, unit = re.sub(r"[\])]\s*$", "", cell).partition("[")
     if not unit:
         name, _, unit = name.partition("(")
@@ -254,20 +255,21 @@ def _split(cell: str) -> tuple[str, str]:
 
 
 def _factor(where: str, unit: str, kind: str) -> float:
-    """What brings a unit to SI; ``-mm`` is mm of a column that is positive downwards."""
+    """The factor from a unit to SI; ``-mm`` is mm in a column that is positive downwards."""
     spelt = unit.translate(str.maketrans({"µ": "u", "μ": "u", "²": "2", "^": "", " ": ""}))
     found, factor = UNITS.get(spelt.removeprefix("-"), ("", 0.0))
     if found != kind:
-        told = f"the unit {plain(unit, 40)} is not {kind}, m{kind}, µ{kind} or the like"
-        raise BadInput(f"{where}: {told}.")
+        words = f"the unit {plain(unit, 40)} is not {kind}, m{kind}, µ{kind} or the like"
+        raise BadInput(f"{where}: {words}.")
     return -factor if spelt.startswith("-") else factor
 
 
 def _tracker_names(path: str, line: int, tracks: list[str], head: list[str]) -> list[str]:
-    """Names as in the trials, from the line with the tracks and the line with t x y t x y."""
+    """Names as in the trials, from the line of track names and the line t x y t x y …; "" for a
+    column that is not used."""
     track, found = "", []
     for cell, quantity in zip_longest(tracks[: len(head)], map(_bare, head), fillvalue=""):
-        track = cell or track
+        track = cell or track  # a track's name stands above its first column only
         if quantity == "t":
             found.append("t" if "t" not in found else "")
             continue

@@ -18,12 +18,12 @@ from cosim.trials.flaws import flaws
 from cosim.trials.table import FEWEST_ROWS, read_table
 
 LONGEST_NAME = 100
-"""Bytes of a trial's file name: others, and descriptions of scenes, are made of it."""
+"""Most bytes of a trial's file name, which names of other files and scenes contain."""
 
 
 @dataclass(frozen=True)
 class Track:
-    """Vertical motion of one body: m, m/s; NaN where nothing is known."""
+    """Vertical motion of one body: height, m, and velocity, m/s; NaN where unknown."""
 
     z: Array
     v: Array
@@ -56,8 +56,8 @@ def trial_files(folder: Path, apart: Path | None = None) -> list[Path]:
     """The trials' files in the order of their numbers; BadInput where there are none.
 
     Where files have “trial” in their names only these count, else all ``.csv`` and ``.txt`` but
-    the file ``apart``. What is no file stays, for the reader to refuse: a trial whose link leads
-    nowhere must not be left out in silence.
+    the file ``apart``. Broken links and folders stay in the list, so that reading them fails: no
+    trial may be left out in silence.
     """
     name = plain(folder)
     try:
@@ -73,7 +73,7 @@ def trial_files(folder: Path, apart: Path | None = None) -> list[Path]:
     if not files:
         raise BadInput(f"{name}: there are no trials (.csv or .txt) in this folder.")
     stems: set[str] = set()
-    for path in files:  # a trial's name stands in tables, figures and names of files
+    for path in files:  # their names occur in tables, figures and names of other files
         if not path.name.isprintable() or len(os.fsencode(path.name)) > LONGEST_NAME:
             words = f"must be printable and have at most {LONGEST_NAME} bytes; rename it"
             raise BadInput(f"{plain(path)}: the name of a trial {words}.")
@@ -84,9 +84,8 @@ def trial_files(folder: Path, apart: Path | None = None) -> list[Path]:
 
 
 def read(path: Path) -> Trial:
-    """One trial, of the rows in which surface and part are known; times need not be even. Raises
-    BadInput, with file, row and column, for what is wrong with it, and warns by a ``Note`` of what
-    may be."""
+    """One trial, with the rows in which surface and part are known; times need not be even. Raises
+    BadInput, with file, row and column, for errors, and warns by a ``Note`` of probable flaws."""
     table = read_table(path)
     for name, letters in (("time", "t"), ("z_surface", "zp"), ("z_part", "zo")):
         if name not in table.columns:
@@ -106,7 +105,7 @@ def read(path: Path) -> Trial:
 
 
 def read_platform(path: Path) -> tuple[Array, Track]:
-    """Times (s) and motion of the surface, which may be all that was tracked. Raises BadInput."""
+    """Times (s) and motion of the surface, of a file that needs no part. Raises BadInput."""
     table, name = read_table(path), plain(path)
     found = ", ".join(table.headers.values())
     if "time" not in table.columns:
@@ -120,7 +119,8 @@ def read_platform(path: Path) -> tuple[Array, Track]:
 
 
 def track(columns: dict[str, Array], body: str) -> Track:
-    """The motion of a body (a value of ``BODIES``) in the columns of a table, which has a time."""
+    """The motion of a body (a value of ``BODIES``) from columns that include ``time``; velocities
+    that are missing are differences of the heights."""
     time = columns["time"]
     nothing = np.full(len(time), np.nan)
     z, v = (columns.get(f"{quantity}_{body}", nothing) for quantity in ("z", "v"))

@@ -31,32 +31,32 @@ COLUMNS: dict[str, Quantity] = _FIRST | {
     f"{name}_2": Quantity(_FIRST[name].unit, f"{_FIRST[name].text}, second surface")
     for name in _SECOND
 }
-"""Every column by its name, in the order of the files. Absent participants have none.
+"""Every column by its name, in the order of the files. Absent bodies and circuits have none.
 
-A row at a jump (of the command, of a given surface, of the grip) holds in all columns what is just
-before it; the first row is the machine at rest, without command, or a given surface's start.
+A row at a jump (of the command, of a given surface, of the grip) holds the values just before it in
+all columns; the first row is the machine at rest, without command, or a given surface's start.
 """
 
 UNITS = {name: column.unit for name, column in COLUMNS.items()}
 
 
 def about(name: str, unit: str) -> dict[str, str]:
-    """A column's attributes in a dataset; one of a scene's own FMUs has no words but its name."""
+    """A column's attributes in a dataset; signals of a scene's own FMUs have no ``long_name``."""
     return {"units": unit} | ({"long_name": COLUMNS[name].text} if name in COLUMNS else {})
 
 
 def netcdf_name(name: str) -> str:
-    """A name as netCDF can have it: without a slash, without a space at its end, and with a letter,
-    digit or _ first."""
+    """The nearest name that netCDF allows: no slash, no space at its end, and a letter, digit or _
+    first."""
     return ("" if name[:1].isalnum() else "_") + name.replace("/", "|").rstrip(" ")
 
 
 def netcdf_names(names: Iterable[str]) -> dict[str, str]:
-    """For each name one of :func:`netcdf_name`, none of them twice; whose own it is keeps it."""
+    """A different :func:`netcdf_name` for each name; valid names remain as they are."""
     taken: dict[str, str] = {}
     for name in sorted(names, key=lambda each: netcdf_name(each) != each):
-        one = netcdf_name(name)
-        while one in taken:
-            one += "_2"
-        taken[one] = name
-    return {name: one for one, name in taken.items()}
+        valid = netcdf_name(name)
+        while valid in taken:
+            valid += "_2"
+        taken[valid] = name
+    return {name: valid for valid, name in taken.items()}

@@ -1,4 +1,4 @@
-"""The figure of a run: what the circuit did, and what the mechanics made of it."""
+"""The figure of a run: signals of the circuit, and the motion of the mechanics."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -29,9 +29,9 @@ BODIES: dict[str, dict[str, Any]] = {
 PERIODS_SHOWN = 3
 
 LINEAR = 100.0
-"""Acceleration, m/s², up to which its axis is linear: impacts are far above it."""
+"""m/s²; the axis of the acceleration is logarithmic beyond it, as impacts are far greater."""
 _MOST_ROWS = 200_000
-"""Of a curve that is drawn as it is."""
+"""Rows of a curve up to which all are drawn; of a longer one the extremes of _STRETCHES parts."""
 _STRETCHES = 4000
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -43,7 +43,7 @@ def draw(scene: Scene, waves: dict[str, Array], numbers: dict[str, Any]) -> Pict
     figure = Picture(13.0, height)
     axes = figure.subplots(2 if given else 3, 2)
     title, beside = _title(scene, numbers), _measured(scene)
-    # Room that was measured once: a layout engine would double the time of a short run.
+    # Fixed margins, in inches: a layout engine would double the time of a short run.
     top = 1 - (0.85 if beside else 0.62) / height
     figure.subplots_adjust(
         left=0.067, right=0.942, bottom=0.5 / height, top=top, wspace=0.3, hspace=0.4
@@ -72,9 +72,9 @@ MOST_PANELS = 12
 
 def draw_own(scene: Scene, waves: dict[str, Array], units: Mapping[str, str]) -> Picture:
     """The figure of a run of a scene with its own FMUs: a panel for each waveform, up to
-    MOST_PANELS, the whole run: first those that are asked for, last those that stay the same."""
-    asked, every = asked_for(scene), [name for name in waves if name != "time"]
-    ranked = sorted(every, key=lambda name: (np.ptp(waves[name]) == 0.0, name not in asked))
+    MOST_PANELS, over the whole run: first those that are asked for, last constant ones."""
+    asked, signals = asked_for(scene), [name for name in waves if name != "time"]
+    ranked = sorted(signals, key=lambda name: (np.ptp(waves[name]) == 0.0, name not in asked))
     names = ranked[:MOST_PANELS]
     figure, axes = grid(len(names), 1 if len(names) < 4 else 2, 13.0, 1.9, 1.2)
     for axis, name in zip(axes, names, strict=True):
@@ -86,14 +86,15 @@ def draw_own(scene: Scene, waves: dict[str, Array], units: Mapping[str, str]) ->
         )
         axis.set_title(name.replace("$", "\\$"), loc="left", fontsize=10.5)
     words = [scene.description or scene.name]
-    words += [f"{len(names)} of {len(every)} waveforms"] * (len(names) < len(every))
+    words += [f"{len(names)} of {len(signals)} waveforms"] * (len(names) < len(signals))
     words += ["grey: settling"] * (scene.run.settle > 0)
     figure.suptitle("; ".join(words).replace("$", "\\$"), fontsize=12)
     return figure
 
 
 def _last_periods(scene: Scene, time: Array) -> slice:
-    """The rows of the last few periods; of the last part of the run where nothing is driven."""
+    """The rows of the last PERIODS_SHOWN periods; without a period of the last tenth of the run, or
+    of all if the surface is given. At most _MOST_ROWS."""
     run = scene.run
     length = scene.period
     if math.isfinite(length):
@@ -105,8 +106,8 @@ def _last_periods(scene: Scene, time: Array) -> slice:
 
 
 def _outline(time: Array, values: Array) -> tuple[Array, Array]:
-    """A curve of fewer points that covers the same pixels: of each of many short stretches the
-    smallest and the largest value. One of not so many points stays as it is."""
+    """A curve of fewer points that covers the same pixels: the smallest and the largest value of
+    each of _STRETCHES parts; a curve of at most _MOST_ROWS rows is returned as it is."""
     if len(time) <= _MOST_ROWS:
         return time, values
     starts = np.linspace(0, len(time), _STRETCHES + 1).astype(int)
@@ -115,7 +116,7 @@ def _outline(time: Array, values: Array) -> tuple[Array, Array]:
         found.append((time[begin], values[begin:end].min(), values[begin:end].max()))
         release()
     begins, *ends = np.array(found).T
-    return np.repeat(begins, 2), np.stack(ends, axis=1).ravel()
+    return np.repeat(begins, 2), np.stack(ends, axis=1).ravel()  # least and greatest alternate
 
 
 def _title(scene: Scene, numbers: dict[str, Any]) -> str:
@@ -138,7 +139,7 @@ def _title(scene: Scene, numbers: dict[str, Any]) -> str:
 
 
 def _measured(scene: Scene) -> str:
-    """A line with what the trial that the scene repeats showed."""
+    """A line with the measured values of the trial that the scene repeats; else empty."""
     found = measured(scene)
     if found is None:
         return ""
@@ -180,13 +181,13 @@ def _head(axis: Axes, title: str, handles: Sequence[Artist] | None = None) -> No
         handles, _ = axis.get_legend_handles_labels()
     if handles:
         spacing = {"borderpad": 0.1, "columnspacing": 1.2}
-        if any(one.get_label() == "second" for one in handles):  # one more, beside the title
+        if any(x.get_label() == "second" for x in handles):  # a wider legend beside the title
             spacing |= {"columnspacing": 0.7, "handlelength": 1.0, "handletextpad": 0.4}
         legend_above(axis, handles=handles, ncols=len(handles), fontsize=8, **spacing)
 
 
 def _at_least(axis: Axes, span: float) -> None:
-    """Widen the vertical range to ``span``: what stands still is not to show its rounding."""
+    """Widen the vertical range to ``span``, so that rounding of a resting body is not visible."""
     low, high = axis.get_ylim()
     if high - low < span:
         middle = 0.5 * (low + high)
@@ -210,7 +211,7 @@ def _command(axis: Axes, scene: Scene, time: Array, cut: dict[str, Array]) -> No
     if "current_2" in cut:
         axis.plot(time, cut["current_2"], color=SECOND, lw=1.1, ls="--", label="second (left)")
     right.set_ylabel("V1 [V]")
-    # On these scales the two curves coincide where the source does what it is told.
+    # On these scales the two curves coincide where the current source follows its command.
     scale = scene.circuit.sense_resistance * scene.coil.count
     both = np.concatenate([cut["current"], cut["command"] / scale])
     edge = max(0.05 * np.ptp(both), 0.02)
@@ -242,7 +243,7 @@ def _positions(axis: Axes, _: Scene, time: Array, cut: dict[str, Array]) -> None
 
 def _velocities(axis: Axes, _: Scene, time: Array, cut: dict[str, Array]) -> None:
     behind = []
-    if "v_ram" in cut:  # several times as fast as what it drives
+    if "v_ram" in cut:  # several times as fast as the surface, so on an axis of its own
         right = axis.twinx()
         relative = cut["v_ram"] - cut["v_surface"]
         behind = right.plot(time, relative, color=RAM, lw=0.8, label="ram on surface (right)")
@@ -265,7 +266,7 @@ def _shade_sticking(axis: Axes, time: Array, sticking: Array) -> None:
 
 
 def _power_of_ten(value: float, _: float) -> str:
-    """A tick of a symmetric logarithmic axis, without the parser of formulas, which takes long."""
+    """Label of a tick of a symmetric logarithmic axis, without matplotlib's slow formula parser."""
     if value == 0.0:
         return "0"
     power = f"{np.log10(abs(value)):.0f}".translate(_RAISED)
@@ -275,6 +276,7 @@ def _power_of_ten(value: float, _: float) -> str:
 def _acceleration(axis: Axes, scene: Scene, time: Array, cut: dict[str, Array]) -> None:
     axis.plot(time, cut["a_surface"], color=SURFACE, lw=0.8, label="true")
     exposure = scene.run.shutter / FRAME_RATE
+    # The frames whose exposure is inside the shown rows.
     first, last = cut["time"][[0, -1]] + np.array([exposure, -exposure]) / 2
     frames = np.arange(np.ceil(first * FRAME_RATE), last * FRAME_RATE) / FRAME_RATE
     if len(frames) > 4:

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 
 class Quantity(NamedTuple):
-    """What a column of the waveforms or an entry of the summary is: its SI unit, ``""`` for words
-    and lists, and its meaning."""
+    """A column of the waveforms or an entry of the summary: its SI unit (``""`` for words and
+    lists) and its meaning."""
 
     unit: str
     text: str
@@ -18,18 +18,18 @@ class Quantity(NamedTuple):
 _ROWS = Path(__file__).with_name("summary.csv").read_text(encoding="utf-8").splitlines()
 
 SUMMARY = {row.pop("name"): Quantity(**row) for row in DictReader(_ROWS)}
-"""Every entry by its name. Absent participants have none of theirs."""
+"""Every entry by its name. A run lacks the entries of absent bodies and circuits."""
 
 
 UNITLESS = ("", "1", "?")
-"""What stands for the unit of words, of plain numbers, and of what is not known."""
+"""Units of words and lists, of plain numbers, and of signals whose unit is not known."""
 
 OF_SOURCES = {"power": "W", "energy": "J"}
-"""What a scene with ports has of a source, in its unit."""
+"""Entries that a scene with ports has of each source, and their units."""
 
 
 def percent(share: float) -> str:
-    """A share in words, by two digits: 0.0006 is ``0.06 %``."""
+    """A share in percent with two digits: 0.0006 is ``0.06 %``."""
     number = 100.0 * share
     return f"{number:.2g} %" if abs(number) < 99.5 else f"{number:.0f} %"
 
@@ -50,7 +50,7 @@ _PRINTED = {"N/m1.5": "N/m^1.5", "N.s/m": "N·s/m", "Ohm": "Ω"}
 
 
 def printed(unit: str) -> str:
-    """A unit of a file, as people write it."""
+    """A unit of a file in its usual spelling: ``m/s2`` as m/s²."""
     return _PRINTED.get(unit) or re.sub(r"(?<=[a-z])2\b", "²", re.sub(r"(?<=[a-z])3\b", "³", unit))
 
 
@@ -60,7 +60,7 @@ def with_unit(value: float, unit: str, digits: int = 6) -> str:
 
 
 def signed(value: float, form: str) -> str:
-    """A number without its sign where rounding leaves nothing of it."""
+    """A number in this format; without its sign where it is rounded to 0."""
     text = f"{value:{form}}"
     return text if float(text) else text.lstrip("+-")
 
@@ -71,5 +71,5 @@ def label(name: str, unit: str) -> str:
 
 
 def bench_unit(si: str) -> tuple[str, float]:
-    """The unit in which a number with this one is shown, and how many of it are one in SI."""
+    """The unit in which numbers in this SI unit are shown, and the factor to it."""
     return ("mm/s", 1e3) if si == "m/s" else (si, 1.0)

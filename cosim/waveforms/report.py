@@ -1,4 +1,4 @@
-"""A run's numbers for a reader: the table that is printed."""
+"""The printed table of a run's numbers."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -10,7 +10,7 @@ from cosim.waveforms.quantities import label, signed
 
 
 def table(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> str:
-    """The summary in a few lines, in the units of the bench; ``units`` are those of waveforms."""
+    """The summary as lines of text, velocities in mm/s; ``units``: of the waveforms."""
     if scene.has_ports:
         return _own(scene, summary, units)
     lost = summary.get("energy_residual")
@@ -52,11 +52,11 @@ def table(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> st
 
 
 OFF, LEAST = 0.01, 1e-4
-"""By how much a mean velocity may be off the settled one before that is told: relative, and m/s
-where nothing is transported."""
+"""Difference of the mean velocity from the settled motion's above which a row says so: relative,
+and in m/s where nothing is transported."""
 
 MOST_ROWS = 20
-"""Of a scene with its own FMUs, beyond what is asked for."""
+"""Waveforms in the table of a scene with ports, if no more than these are asked for."""
 
 
 def asked_for(scene: Scene) -> set[str]:
@@ -66,23 +66,23 @@ def asked_for(scene: Scene) -> set[str]:
 
 
 def _own(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> str:
-    """Numbers of a scene with own FMUs: a line for each waveform not 0, those asked for first."""
-    every = [name.removesuffix(".mean") for name in summary if name.endswith(".mean")]
-    asked, moving = asked_for(scene), [name for name in every if summary[f"{name}.rms"] != 0.0]
+    """The table of a scene with ports: a line for each waveform not 0, those asked for first."""
+    signals = [name.removesuffix(".mean") for name in summary if name.endswith(".mean")]
+    asked, moving = asked_for(scene), [name for name in signals if summary[f"{name}.rms"] != 0.0]
     ranked = sorted(moving, key=lambda name: name not in asked)
     names = ranked[: max(MOST_ROWS, len(asked.intersection(moving)))]
-    # A waveforms.nc has them by names that netCDF can have.
-    files = netcdf_names(every)
+    # Units from a waveforms.nc are by netCDF's names.
+    files = netcdf_names(signals)
     shown = [label(name, units.get(name) or units[files[name]]) for name in names]
     width = max([20, *map(len, shown)])
-    whats = ["mean", "rms", "least", "greatest"]
-    told = any(name.endswith(".mean_error") for name in summary)
-    whats += ["mean_error"] if told else []
-    lines = [f"  {'':<{width}}" + "".join(f"{what.replace('_', ' '):>13}" for what in whats)]
+    statistics = ["mean", "rms", "least", "greatest"]
+    if any(name.endswith(".mean_error") for name in summary):
+        statistics.append("mean_error")
+    lines = [f"  {'':<{width}}" + "".join(f"{x.replace('_', ' '):>13}" for x in statistics)]
     for name, words in zip(names, shown, strict=True):
-        values = "".join(f"{summary[f'{name}.{what}']:>13.6g}" for what in whats)
+        values = "".join(f"{summary[f'{name}.{x}']:>13.6g}" for x in statistics)
         lines.append(f"  {words:<{width}}{values}")
-    more, still = len(moving) - len(names), len(every) - len(moving)
+    more, still = len(moving) - len(names), len(signals) - len(moving)
     others = [f"{more} more in summary.json"] * (more > 0)
     others += [f"{still} other{'s are' if still > 1 else ' is'} 0 after settling"] * (still > 0)
     lines += [f"  {'; '.join(others)}"] * bool(others)
@@ -105,29 +105,29 @@ def _own(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> str
 
 
 def _measures(summary: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """What the netlist's ``.meas`` lines found."""
+    """The results of the netlist's ``.meas`` lines."""
     for name, value in summary.items():
         if name.startswith("meas."):
             yield name.removeprefix("meas."), "none" if value is None else f"{value:.6g}"
 
 
 def _measured(scene: Scene) -> dict[str, str]:
-    """What the trial that the scene repeats showed, by the names of the rows."""
+    """Measured values of the trial that the scene repeats, by the names of the rows."""
     found = measured(scene)
     if found is None:
         return {}
     _, numbers = found
-    told = {
+    values = {
         "part's mean velocity": _scaled(numbers["v_average"], 1e3, "mm/s", "+.2f"),
         "surface, peak-to-peak": _scaled(numbers.get("z_surface_pp"), 1e3, "mm", ".2f"),
         "surface velocity": _range(numbers, "v_surface", 1e3, "mm/s", "+.0f"),
         "as a camera reads it": _range(numbers, "a_camera", 1, "m/s²", "+.0f"),
     }
-    return {name: f"   (measured: {words})" for name, words in told.items() if words}
+    return {name: f"   (measured: {words})" for name, words in values.items() if words}
 
 
 def _slip(summary: dict[str, Any], way: str) -> str:
-    """Beyond which accelerations of the surface the part slips, and which of them were reached."""
+    """The surface's accelerations beyond which the part slips, and which were reached."""
     if f"slip_{way}" not in summary:
         return ""
     low, high = summary[f"slip_{way}"]
@@ -136,12 +136,12 @@ def _slip(summary: dict[str, Any], way: str) -> str:
         for by, words in (("surface", "instants"), ("camera", "the camera's mean over 4 ms"))
         if f"slip_by_{by}" in summary
     ]
-    told = f"; reached: {', '.join(reached)}" if reached else ""
-    return f"beyond {low:+.1f} … {high:+.1f} m/s²{told}"
+    ending = f"; reached: {', '.join(reached)}" if reached else ""
+    return f"beyond {low:+.1f} … {high:+.1f} m/s²{ending}"
 
 
 def _heat(summary: dict[str, Any]) -> str:
-    """The heat of a coil, and how warm it would make it."""
+    """The heat of a coil, and the estimated rise of its temperature."""
     if "coil_heat" not in summary:
         return ""
     lift, ever = (warmer(summary[f"coil_rise_{name}"]) for name in ("lift", "continuous"))
@@ -150,7 +150,7 @@ def _heat(summary: dict[str, Any]) -> str:
 
 
 def warmer(ends: Sequence[float | None]) -> str:
-    """How much warmer a coil becomes, from the least to the most, K; None is without end."""
+    """The least and greatest rise of a coil's temperature, K, in words; None: without limit."""
     known = [f"{end:.3g}" if end < 999.5 else f"{end:.0f}" for end in ends if end is not None]
     if len(known) < len(ends):
         return f"at least {known[0]} K" if known else "more and more"
@@ -158,13 +158,13 @@ def warmer(ends: Sequence[float | None]) -> str:
 
 
 def _own_error(summary: dict[str, Any]) -> str:
-    """How far the mean velocity may be off by the steps of the run."""
+    """The error of the mean velocity that the run's step sizes may cause (twice its estimate)."""
     error = summary.get("v_average_error")
     return "" if error is None else f"not more than about {2e3 * error:.1g} mm/s"
 
 
 def motion_in_words(summary: Mapping[str, Any]) -> str:
-    """The kind of motion that a summary tells, and what it means for the mean velocity."""
+    """The kind of motion in a summary, and its consequence for the mean velocity."""
     kind = summary.get("motion")
     if kind is None:
         return ""
@@ -184,7 +184,7 @@ def motion_in_words(summary: Mapping[str, Any]) -> str:
 
 
 def of_the_start(scene: Scene, summary: Mapping[str, Any]) -> str:
-    """That the mean velocity is not the one that the motion settles to, where it is not."""
+    """A warning where the mean velocity is not that of the settled motion; else empty."""
     settle, still = scene.run.settle, summary.get("motion") == "no transport"
     late = summary.get("motion_settled", 0.0) > settle + 0.01 * scene.period
     later = 0.0 if still else summary.get("v_average_settled", 0.0)
@@ -196,7 +196,7 @@ def of_the_start(scene: Scene, summary: Mapping[str, Any]) -> str:
 
 
 def _error(summary: dict[str, Any]) -> str:
-    """Of a run whose method and steps were chosen by its error: that error, and the choice."""
+    """For a run that chose its coupling by its error: the error, the method and the steps."""
     if "error_estimate" not in summary:
         return ""
     taken = summary["coupling_taken"]
@@ -205,7 +205,7 @@ def _error(summary: dict[str, Any]) -> str:
 
 
 def _periods(scene: Scene, summary: dict[str, Any]) -> str:
-    """How many periods the averages are over, where something repeats."""
+    """The number of periods of the averages; empty without a period (which is then infinite)."""
     periods = (scene.run.duration - scene.run.settle) / scene.period
     if not periods:
         return ""
@@ -233,10 +233,10 @@ def _range(summary: Mapping[str, Any], name: str, factor: float, unit: str, form
 
 
 MANY = 500
-"""Periods of which one more or less does not matter."""
+"""From so many periods on, averages over whole periods are no better."""
 
 SUSPICIOUS = 1e-3
-"""Share of the energy that a sound run does not lose track of."""
+"""Unaccounted share of the energy above which the table has a warning."""
 
 LIMITS = {
     "swing_high_fraction": "swing high",
@@ -247,15 +247,15 @@ LIMITS = {
 
 
 def _limits(summary: dict[str, Any]) -> str:
-    """Which limits of the amplifier acted, and for which share of the time, of those known."""
+    """The limits of the amplifier that acted, each with its share of the time, as far as known."""
     acted = [
         f"{name} {summary[key] * 100:.3g} %" for key, name in LIMITS.items() if summary.get(key)
     ]
-    told = f"{', '.join(acted)} of the time" if acted else ""
+    words = f"{', '.join(acted)} of the time" if acted else ""
     if "saturated_fraction" in summary:
-        return told or "never"
-    untold = "not known: the netlist has no node swing"
-    return f"{told}; of the swing {untold}" if told else untold
+        return words or "never"
+    unknown = "not known: the netlist has no node swing"
+    return f"{words}; of the swing {unknown}" if words else unknown
 
 
 def _acceleration(scene: Scene, summary: dict[str, Any]) -> str:

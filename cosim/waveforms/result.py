@@ -36,7 +36,7 @@ class Result:
     columns: dict[str, Array]
     summary: dict[str, Any]
     units: Mapping[str, str] = field(default_factory=lambda: UNITS)
-    """Of the columns at least; those of a scene with its own FMUs are its own."""
+    """Units of the columns (and perhaps of others); a scene with its own FMUs has its own ones."""
 
     @cached_property
     def waveforms(self) -> "xr.Dataset":
@@ -61,8 +61,8 @@ class Result:
         """Write what ``cosim run`` writes: ``waveforms.csv``, ``waveforms.nc``, ``scene.toml``,
         ``summary.json`` and ``figure.png``, each whole or not at all.
 
-        Their old ones go only when all but the figure are written. The table's hash is in the
-        others, as :mod:`cosim.waveforms.identity` has it: those of different runs are told apart.
+        Older files are replaced only when all but the figure are written. Each other file contains
+        the hash of ``waveforms.csv``, by which :mod:`cosim.waveforms.identity` finds strangers.
         Raises BadInput where the folder cannot be written to.
         """
         *data, figure = (Path(folder) / name for name in identity.FILES)

@@ -19,10 +19,10 @@ from cosim.waveforms.columns import about, netcdf_names
 if TYPE_CHECKING:
     import xarray as xr
 
-_CSV_ROWS = 1024
+_CSV_ROWS = 1024  # that are formatted together
 
 LARGEST = 1 << 33
-"""Bytes of a waveforms.nc that is read: an hour of rows, far more than is ever compared."""
+"""Bytes of the largest waveforms.nc that is read: an hour of rows, more than is ever compared."""
 
 
 def write_csv(path: Path, waveforms: dict[str, Array], units: Mapping[str, str]) -> None:
@@ -39,17 +39,18 @@ def csv(file: IO[bytes], waveforms: dict[str, Array], units: Mapping[str, str]) 
     row = ",".join(["%.10g"] * len(columns)) + "\n"
     for part in blocks(len(columns[0])):
         for start in range(part.start, part.stop, _CSV_ROWS):
-            few = slice(start, min(start + _CSV_ROWS, part.stop))
-            table = np.column_stack([values[few] for values in columns])
+            rows = slice(start, min(start + _CSV_ROWS, part.stop))
+            table = np.column_stack([values[rows] for values in columns])
             # Many rows in one go: several times as fast as numpy's savetxt.
             file.write((row * len(table) % tuple(table.ravel().tolist())).encode())
 
 
 def _cell(text: str) -> str:
-    """Between quotation marks where a comma would part it."""
+    """A cell, between quotation marks if it has a comma or a quotation mark."""
     return '"' + text.replace('"', '""') + '"' if set(text) & {",", '"'} else text
 
 
+# Tags and types of the netCDF format.
 _DIMENSIONS, _VARIABLES, _ATTRIBUTES = 10, 11, 12
 _CHARACTERS, _DOUBLES = 2, 6
 
@@ -61,7 +62,7 @@ def netcdf(
     attributes: dict[str, str],
 ) -> None:
     """NetCDF (classic format) with the dimension ``time``; each variable has its ``units``, and a
-    column of a run its ``long_name``. It is written a block of all columns at a time.
+    column of a run its ``long_name``. It is written in blocks of rows, of all columns each.
 
     After NetCDF Classic Format Specification, Unidata, with 64-bit offsets; scipy's writer has the
     same bytes, but needs all columns in memory.
@@ -72,7 +73,7 @@ def netcdf(
     head += _attributes(attributes) + pack(">ii", _VARIABLES, len(waveforms))
     names = netcdf_names(waveforms)
     heads = [
-        # One dimension, the first; the type; the size; then the offset.
+        # One dimension, with index 0; attributes; type; bytes. The offset follows below.
         _name(names[name]) + pack(">ii", 1, 0) + _attributes(about(name, units[name]))
         + pack(">ii", _DOUBLES, 8 * count)
         for name in waveforms
@@ -89,7 +90,7 @@ def netcdf(
 
 
 def _name(text: str) -> bytes:
-    """Its length, then its bytes filled up to whole words."""
+    """The length of a text, then its bytes, padded with zeros to a multiple of four."""
     content = text.encode()
     return pack(">i", len(content)) + content + b"\0" * (-len(content) % 4)
 
@@ -133,7 +134,7 @@ def read_netcdf(path: Path) -> tuple[dict[str, Array], dict[str, str], dict[str,
 
 
 class _Damaged(Exception):
-    """What is wrong with a file that can be read."""
+    """An error in a file that scipy can read."""
 
 
 def _why(error: Exception) -> str:
@@ -150,7 +151,7 @@ def _text(value: object) -> str:
 
 
 def renamed(data: "xr.Dataset", change: Callable[[str], str]) -> "xr.Dataset":
-    """All names of a dataset changed: scipy takes the UTF-8 of netCDF's names for Latin-1."""
+    """A dataset with changed names: scipy reads and writes netCDF's UTF-8 names as Latin-1."""
     return data.rename({name: change(str(name)) for name in {*data.variables, *data.dims}})
 
 
@@ -163,9 +164,9 @@ def read_sweep(folder: Path) -> "xr.Dataset":
     try:
         data = xr.load_dataset(content, engine="scipy")
         data = renamed(data, lambda name: name.encode("latin-1").decode())
-        grid, said = {*data["failure"].dims}, [data.attrs["title"]]
+        grid, texts = {*data["failure"].dims}, [data.attrs["title"]]
         for name, each in data.variables.items():
-            said += [each.attrs.get(key, "") for key in ("units", "long_name")]
+            texts += [each.attrs.get(key, "") for key in ("units", "long_name")]
             if not grid.issuperset(each.dims):
                 raise _Damaged(f"{name} has other points")
             number = each.dtype.kind in "iuf" and name != "failure"
@@ -173,7 +174,7 @@ def read_sweep(folder: Path) -> "xr.Dataset":
                 raise _Damaged(f"{name} has other values")
         if not swept(data):
             raise _Damaged("it goes over no key")
-        if not grid or not all(isinstance(text, str) for text in said):
+        if not grid or not all(isinstance(text, str) for text in texts):
             raise _Damaged("there are no points, or no words for their numbers")
     except Exception as error:  # there is little that scipy does not raise on a damaged file
         raise BadInput(f"{plain(path)}: not a whole sweep ({_why(error)}).") from None

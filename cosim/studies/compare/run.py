@@ -39,9 +39,8 @@ class Comparison:
 
     @property
     def numbers(self) -> dict[str, float | None]:
-        """All numbers by name; SI but for ``_mm`` and ``_percent``. A score's bare name is the
-        run's; with ``_ceiling``, ``_no_motion`` or ``_straight_line`` it is that of a reference
-        without a model."""
+        """All numbers by name; SI but for ``_mm`` and ``_percent``. A score's bare name is that of
+        the run; with ``_ceiling``, ``_no_motion``, ``_straight_line`` it is a reference's."""
         return {number.name: number.value for number in self.found.numbers}
 
     def plot(self) -> Picture:

@@ -49,9 +49,8 @@ class Machine:
 
     @property
     def strength(self) -> float:
-        """Strength of the coupling of coil and mechanics while the part sticks, Bl²/(m R), 1/s.
-        m: reduced mass of the two bodies between which the coil acts; R: resistance of the loop in
-        which the back-EMF drives a current."""
+        """Strength of the coupling while the part sticks, Bl²/(m R), 1/s. m: reduced mass of the
+        bodies between which the coil acts; R: resistance around the loop of the back-EMF."""
         m, coil = self.scene.mechanics, self.scene.coil
         mass = 1.0 / (1.0 / m.ram_mass + 1.0 / (m.surface_mass + m.part_mass))
         around = coil.resistance + self.scene.circuit.sense_resistance
@@ -131,7 +130,7 @@ def linear_sides(regime: Regime) -> tuple[LinearParticipant, LinearParticipant]:
     sense, rate, gain = _amplifier(scene)
     leak, driven = (0.0, 0.0) if regime.output == "saturated" else (-rate / gain, -rate * sense)
     circuit = LinearParticipant([[leak]], [[driven]], [[1.0]], [[-sense]], state=[0.0])
-    # Mechanics: coil's voltage in, current out; the current is the fifth state.
+    # Mechanics: voltage in, current out, which is the fifth state.
     whole = [[*row, x] for row, x in zip(a, b, strict=True)]
     whole.append([0.0, -bl / inductance, 0.0, 0.0, -scene.coil.resistance / inductance])
     enters = [[0.0]] * 4 + [[1.0 / inductance]]

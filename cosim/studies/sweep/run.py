@@ -112,7 +112,6 @@ def _sweep(
         raise BadInput(f"{plain(family)}: this is no directory of the sweep's own; remove it.")
     made_by, units = {**versions(), "fmu": fmu.token()}, dataset.units_of(scene)
     total, numbers = len(design), dataset.Numbers(len(design))
-    # What identifies this sweep in its store: the axes' values, and the sample.
     asked = [(axis.key.full, axis.values) for axis in design.axes], design.sample
     whole_periods = design.changes_frequency
 

@@ -98,8 +98,7 @@ def tune(
 
     In the folder ``out`` it leaves what ``Tuning.save`` writes, and resumes an interrupted search.
 
-    Raises BadInput for unknown keys or quantities and ranges outside a key's limits;
-    SimulationFailed if all runs failed.
+    Raises BadInput for bad keys, ranges, quantities; SimulationFailed if all runs failed.
     """
     quantity, largest = maximise or minimise, minimise is None
     if quantity is None or (maximise and minimise):
@@ -160,7 +159,6 @@ def tune(
                 raise
             tuned = changed(base, {**best.values, **judge}, "tune")
             tuned = in_whole_periods(tuned) if whole else tuned
-            # The value by the fast solver of the same point, if its search had that.
             ran_ahead = (run.value for run in ahead if judge and run.values == best.values)
             tunings.append(
                 Tuning(
@@ -180,8 +178,7 @@ def tune(
 
 def family(name: str) -> tuple[dict[str, Any], dict[str, tuple[float, float]]]:
     """Values of keys that give a scene the waveform ``name``, and the ranges of the numbers of its
-    shape: the N levels, at even phases, of "steps:N" and "pieces:N", the duty of "square". Raises
-    BadInput."""
+    shape: N levels at even phases of "steps:N" and "pieces:N", the duty of "square". BadInput."""
     shape, _, count = name.partition(":")
     sharp = {"drive.waveform": shape, "drive.reset_time": 0.0, "drive.duty": 0.5}
     few = count.isdecimal() and len(count) < 4

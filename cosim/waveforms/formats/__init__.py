@@ -1,4 +1,4 @@
-"""A finished run in the formats of other programs, one format a module.
+"""A finished run in file formats of other programs, one module for each format.
 
 A module declares its format as ``FORMAT`` and imports nothing heavy at its top. Every format is
 made from ``waveforms.nc``, whose numbers have all their digits.
@@ -21,7 +21,7 @@ __all__ = ["export", "formats", "parse", "read"]
 def formats() -> dict[str, Format]:
     """Every format by its name."""
     found = [module.FORMAT for module in modules(__name__) if hasattr(module, "FORMAT")]
-    return {one.name: one for one in sorted(found, key=lambda one: one.name)}
+    return {each.name: each for each in sorted(found, key=lambda each: each.name)}
 
 
 def parse(lists: list[str]) -> list[str]:

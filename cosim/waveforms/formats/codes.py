@@ -1,4 +1,4 @@
-"""The drive as the device's firmware plays it: a C header with one period of DAC codes."""
+"""The drive as the device's firmware outputs it: a C header with one period of DAC codes."""
 
 from io import BytesIO
 from textwrap import fill
@@ -11,8 +11,8 @@ from cosim.waveforms.formats.source import Format, Run, driven
 
 
 def write(run: Run, file: BytesIO) -> str:
-    """10-bit codes, each for 50 µs, and the offset pin's: V1 = 3.191 (V_offset - V_DAC), with
-    3.3 V for the code 1024. Those of a scene with ``drive.quantised``, which any scene is made."""
+    """10-bit codes, each for 50 µs, and the code of the offset pin: V1 = 3.191 (V_offset - V_DAC),
+    with 3.3 V for the code 1024. The scene is taken with ``drive.quantised``."""
     scene = driven(run, "codes")
     quantised = changed(scene, {"drive.quantised": True, "drive.loop_time": 0.0}, str(run.folder))
     made = shape(quantised)

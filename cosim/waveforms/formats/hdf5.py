@@ -1,4 +1,4 @@
-"""HDF5, laid out as netCDF-4 wants it, so that netCDF4 and xarray open it with its dimension."""
+"""HDF5 in the layout of netCDF-4, so that netCDF4 and xarray find the dimension ``time``."""
 
 from io import BytesIO
 
@@ -15,7 +15,7 @@ def write(run: Run, file: BytesIO) -> str:
         raise BadInput(
             "--as hdf5 needs the package h5py, which the extra hdf5 of this project installs."
         ) from None
-    # netCDF-4 knows its variables by the order in which they were made.
+    # netCDF-4 needs the order in which its variables were created.
     with h5py.File(file, "w", track_order=True) as root:
         root.attrs.update(run.attributes)
         time = root.create_dataset("time", data=run.waveforms["time"])

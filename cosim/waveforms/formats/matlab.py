@@ -7,19 +7,19 @@ from io import BytesIO
 from cosim.waveforms.formats.source import Format, Run
 
 LONGEST = 63
-"""Letters of a name in MATLAB."""
+"""Most letters of a name in MATLAB."""
 
 ABOUT = 116  # bytes of free text at the file's beginning
 
 
 def write(run: Run, file: BytesIO) -> str:
-    """A column vector for each column, under its own name and in SI; a struct ``units`` with the
-    unit of each (signs that MATLAB's names do not have are _); ``title``, ``scene`` (the text of
-    scene.toml) and ``run``."""
+    """A column vector for each column, under its own name and in SI (_ replaces characters that
+    MATLAB's names cannot have); a struct ``units`` with the unit of each; ``title``, ``scene`` (the
+    text of scene.toml) and ``run``."""
     from scipy.io import savemat
 
     names = legal(run.waveforms, {"units", *run.attributes})
-    variables: dict[str, object] = {names[name]: of for name, of in run.waveforms.items()}
+    variables: dict[str, object] = {names[name]: values for name, values in run.waveforms.items()}
     units = {names[name]: unit for name, unit in run.units.items()}
     found = variables | {"units": units} | run.attributes
     savemat(file, found, format="5", oned_as="column", long_field_names=True)
@@ -30,15 +30,15 @@ def write(run: Run, file: BytesIO) -> str:
 
 
 def legal(names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, str]:
-    """For each name one of MATLAB's, none of them twice or ``taken``."""
+    """For each name a different one that MATLAB allows and that is not ``taken``."""
     found: dict[str, str] = {}
     for name in names:
         word = re.sub(r"\W", "_", name, flags=re.ASCII).lstrip("_")
         word = word if word[:1].isalpha() else f"x{word}"
-        one, others, k = word[:LONGEST], {*found.values(), *taken}, 2
-        while one in others:
-            one, k = f"{word[: LONGEST - 4]}_{k}", k + 1
-        found[name] = one
+        valid, used, k = word[:LONGEST], {*found.values(), *taken}, 2
+        while valid in used:
+            valid, k = f"{word[: LONGEST - 4]}_{k}", k + 1
+        found[name] = valid
     return found
 
 

@@ -7,15 +7,15 @@ from cosim.drive.straights import straights
 from cosim.waveforms.formats.source import Format, Run, driven
 
 CHORDS = 256
-"""Straight lines a period of a sine; the shape within one is off by 5e-5 of the amplitude."""
+"""Straight lines in a period of a sine; their error is 5e-5 of the amplitude."""
 
 EDGE = 1e-9
-"""s: what a jump takes, after its time."""
+"""Duration of a jump, s; it begins at the jump's time."""
 
 
 def write(run: Run, file: BytesIO) -> str:
-    """``Vcommand v1 0 PWL(…)`` for ``.include``, in ngspice and LTspice: V1, where the netlists'
-    own source has it. A jump lasts 1 ns, and a sine is 256 straight lines a period."""
+    """``Vcommand v1 0 PWL(…)`` for ``.include`` in ngspice and LTspice: V1, at the nodes of the
+    netlists' own source. A jump lasts 1 ns, and a period of a sine is 256 straight lines."""
     scene = driven(run, "pwl")
     points = [(0.0, 0.0)]
     for edges, start, end in straights([command(scene)], scene.run.duration, CHORDS):

@@ -11,14 +11,14 @@ import numpy as np
 from cosim.waveforms.formats.source import Format, Run
 
 TYPES = {"s": ("time", "{}"), "V": ("voltage", "v({})"), "A": ("current", "i({})")}
-"""The type and the form of the name that go with a unit."""
+"""By a column's unit: ngspice's type, and the form of the name."""
 
 TITLE_BYTES = 400
-"""ngspice takes what is beyond 511 bytes for a line of its own, which can be a command."""
+"""Most bytes of the title. ngspice reads a line's bytes beyond 511 as a new line, or a command."""
 
 
 def write(run: Run, file: BytesIO) -> str:
-    """One plot, a transient analysis over the run's rows; the date is that of the run."""
+    """One plot, a transient analysis with the run's rows; its date is the run's."""
     names = list(run.waveforms)
     lines = [
         f"Title: {_line(run.attributes['title'])}",
@@ -40,7 +40,7 @@ def write(run: Run, file: BytesIO) -> str:
 
 
 def _line(text: str) -> str:
-    """One line that is short enough."""
+    """The text as one line of at most TITLE_BYTES, not empty."""
     return " ".join(text.split()).encode()[:TITLE_BYTES].decode(errors="ignore") or "cosim"
 
 

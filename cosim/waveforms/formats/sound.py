@@ -12,23 +12,23 @@ from cosim.errors import BadInput, plain
 from cosim.waveforms.formats.source import Format, Run, machine
 
 RATE = 48000  # Hz
-LARGEST = 32767
+LARGEST = 32767  # of a 16-bit sample
 SILENCE = 1e-9
-"""m/s; a slower surface is at rest, and its rounding errors stay inaudible."""
+"""m/s; a surface that is never faster is at rest: its rounding errors are not amplified."""
 
 LOW_PASS: Any = ("kaiser", 12.0)
-"""SciPy's filter with a window whose side lobes, at -118 dB, are below what 16 bits tell."""
+"""Window of SciPy's filter; its side lobes, at -118 dB, are below the resolution of 16 bits."""
 
 LARGEST_TERM = 10_000
-"""Of the fraction for the ratio of the rates: rounding changes the pitch by less than 1e-4."""
+"""Largest term of the fraction for the ratio of rates; it changes the pitch by less than 1e-4."""
 
-LONGEST = 600.0  # s
-RAREST = 1e-2  # s, of the rows
+LONGEST = 600.0  # s, of a run
+RAREST = 1e-2  # s between rows
 
 
 def write(run: Run, file: BytesIO) -> str:
-    """The whole run from its beginning; half a unit of the last place is the error. The loudest
-    sample is 32767, and the line that tells of the file says what it is in m/s."""
+    """The whole run from its beginning, rounded to whole samples. The loudest one is ±32767; the
+    printed line has the factor to m/s."""
     machine(run, "wav", "v_surface")
     for key, value, most in (
         ("output_step", run.step, RAREST),
@@ -51,7 +51,7 @@ def write(run: Run, file: BytesIO) -> str:
 
 
 def resampled(values: Array, step: float) -> Array:
-    """``values``, ``step`` seconds apart, at the rate of the sound, from the first to the last."""
+    """``values``, ``step`` seconds apart, resampled at RATE, from the first to the last."""
     from scipy.signal import resample_poly
 
     exact = Fraction(RATE * step)

@@ -1,4 +1,4 @@
-"""What a format is, and what every format is made from: a run as its folder holds it."""
+"""The declaration of a format, and the finished run in a folder from which files are made."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,18 +15,18 @@ from cosim.waveforms.storage import read_netcdf
 
 @dataclass(frozen=True)
 class Run:
-    """A finished run: its columns (SI, of equal length) with their units, and what was run."""
+    """A finished run: its columns (SI, of equal length), their units, and its scene."""
 
     folder: Path
     waveforms: dict[str, Array]
     units: dict[str, str]
     attributes: dict[str, str]
-    """Its ``title``, as ``scene`` the text of its scene.toml, and as ``run`` which run it is."""
+    """``title``, ``scene`` (text of scene.toml), and ``run`` (the run's name, if known)."""
     written: datetime
 
     @property
     def step(self) -> float:
-        """Time between the rows, s."""
+        """Mean time between the rows, s."""
         time = self.waveforms["time"]
         return float(time[-1] - time[0]) / (len(time) - 1)
 
@@ -36,13 +36,13 @@ class Format:
     """A format that a run can be exported in."""
 
     name: str
-    """What ``--as`` takes."""
+    """Its name for ``--as``."""
     file: str
-    """Name of the file that it becomes."""
+    """Name of the file that is written."""
     help: str
     write: Callable[[Run, BytesIO], str]
-    """Makes the file, and returns a line on what it holds; raises BadInput for a run that lacks
-    what the format needs."""
+    """Writes the file and returns a line on its content; raises BadInput for a run that lacks
+    columns or a drive that the format needs."""
 
 
 def read(folder: Path) -> Run:
@@ -63,8 +63,8 @@ def read(folder: Path) -> Run:
 
 
 def machine(run: Run, form: str, *columns: str) -> Scene:
-    """The scene of a run of the built-in machine; raises BadInput for another, and for one that
-    lacks one of the ``columns``."""
+    """The scene of a run of the built-in machine; raises BadInput for a scene with ports, and for a
+    run that lacks one of the ``columns``."""
     scene = load(run.folder / "scene.toml")
     if scene.has_ports:
         raise BadInput(
@@ -78,7 +78,7 @@ def machine(run: Run, form: str, *columns: str) -> Scene:
 
 
 def driven(run: Run, form: str) -> Scene:
-    """The scene of a run that a command drives; raises BadInput for another."""
+    """The scene of a run whose coil follows a command; raises BadInput without a coil."""
     scene = machine(run, form)
     if not scene.rung.driven:
         raise BadInput(

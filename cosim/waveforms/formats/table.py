@@ -1,4 +1,4 @@
-"""The run's own CSV, for another folder: a header ``name [unit]``, ten digits a number."""
+"""The run's own CSV, for another folder: a header ``name [unit]``, numbers with ten digits."""
 
 from io import BytesIO
 

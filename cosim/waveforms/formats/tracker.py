@@ -1,7 +1,7 @@
-"""A tracked trial made of a run: the header, units, sampling and digits of the published trials.
+"""A run as a tracked trial, with the header, units, sampling and digits of the published trials.
 
-The camera is that of `cosim compare`, with the shutter of the run's scene, without noise. What the
-model holds at rest is written as resting: platform and part across, and the spring-loaded plate.
+The camera is that of `cosim compare`, with the shutter of the run's scene, without noise. Motion
+that the model does not have is written as 0: horizontal motion, and the spring-loaded plate.
 """
 
 from functools import partial
@@ -24,10 +24,10 @@ from cosim.trials.table import FEWEST_ROWS
 from cosim.waveforms.formats.source import Format, Run, machine
 
 MOST_FRAMES = 200_000
-"""A trial of more is larger than a file that `cosim compare` reads."""
+"""With more frames the file would be too large for `cosim compare`."""
 
 MISSING = "\ufffd"
-"""What stands in the published trials for a value that Tracker could not make."""
+"""The published trials' mark for a value that Tracker could not calculate."""
 
 
 def write(run: Run, file: BytesIO) -> str:
@@ -48,9 +48,9 @@ def write(run: Run, file: BytesIO) -> str:
     for body, name in (("p", "surface"), ("o", "part"), ("s", "")):
         z = heights(run.waveforms, name, at, exposure) if name else rest
         across, along = rest, 1e3 * z
-        for kind, of in (("", np.copy), ("v", partial(velocities, time)), ("a", accelerations)):
-            columns[f"{kind}x{body}"] = of(across)
-            columns[f"{kind}z{body}"] = of(along)
+        for kind, made in (("", np.copy), ("v", partial(velocities, time)), ("a", accelerations)):
+            columns[f"{kind}x{body}"] = made(across)
+            columns[f"{kind}z{body}"] = made(along)
     rows = zip(*(map(number, values.tolist()) for values in columns.values()), strict=True)
     text = "\r\n".join([",".join(columns), *map(",".join, rows)])
     file.write(text.encode())
@@ -58,8 +58,8 @@ def write(run: Run, file: BytesIO) -> str:
 
 
 def laid_over(scene: Scene) -> tuple[float, float | None]:
-    """The first time of a run that may be laid over a trial's first frame, s, and its period, s;
-    None where nothing drives it, or a trial's own surface does: then there is nothing to shift."""
+    """The first time of a run that may correspond to a trial's first frame, s, and its period, s;
+    None without a drive, or with a surface from a file: such a run cannot be shifted."""
     if scene.drive.file is not None:
         return 0.0, None
     length = scene.period
