@@ -1,8 +1,8 @@
-"""Measures this project itself: the cost of coupling, and other programs for comparison.
+"""Measurements of this project itself: the cost of coupling, and other programs for comparison.
 
     python -m benchmarks [NAME ...] [--quick] [--trials DIR] [--out DIR]
 
-measures all, or the named ones, together with the numbers of ``cosim bench``, and writes
+measures all, or the named ones, and always what ``cosim bench`` measures, and writes
 ``bench.json``. Run it from the top of a checkout. ``python -m benchmarks.charts`` draws the charts
 that have other programs in them.
 """
@@ -42,7 +42,7 @@ TARGETS: bench.Targets = bench.TARGETS | {
 }
 
 Measure = Callable[[bool, Path | None], Any]
-"""Gives its part of the numbers; its arguments: whether it is quick, and the trials' folder."""
+"""Returns its part of the numbers; the arguments are ``quick`` and the trials' folder."""
 
 MEASURES: dict[str, Measure] = {
     "parts": lambda quick, _: {"coupled_over_parts": parts.measure(3 if quick else 11)},
@@ -68,7 +68,7 @@ def main() -> None:
     if not set(asked.names) <= set(MEASURES):
         parser.error(f"a NAME must be one of {', '.join(MEASURES)}")
     numbers: dict[str, Any] = {}
-    with in_place():  # CPU times are those of one process
+    with in_place():  # no child processes: their CPU time would be missing
         for name in asked.names or MEASURES:
             numbers |= MEASURES[name](asked.quick, asked.trials)
         numbers |= bench.measure(asked.quick)
@@ -79,8 +79,8 @@ def main() -> None:
     print(bench.table(numbers, TITLES))
     if "instructions_per_period" in numbers:
         counted = numbers["instructions_per_period"]
-        told = f"{counted:,}" if counted else "not counted: valgrind is needed"
-        print(f"Instructions of the FMU per period: {told}")
+        words = f"{counted:,}" if counted else "not counted: valgrind is needed"
+        print(f"Instructions of the FMU per period: {words}")
 
 
 if __name__ == "__main__":

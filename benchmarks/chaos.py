@@ -1,10 +1,9 @@
-"""Where a scene is chaotic: statistics over an ensemble in the place of single paths.
+"""A chaotic scene: statistics over an ensemble instead of single paths.
 
-A scene is chaotic where a change of the normal force by 1e-9 of itself moves the part's path by
-more than ``CHAOTIC`` times as much. No method can follow such a path, whatever its steps. What can
-be compared is an ensemble: the same runs from normal forces a little apart, of which each method
-must give the same mean velocity, share of sticking and counts of events, within what the
-ensemble's own spread leaves open.
+A scene is chaotic if a relative change of the normal force by 1e-9 changes the part's path by more
+than ``CHAOTIC`` times as much, relative to its range. No method can follow such a path, whatever
+its steps. An ensemble of runs with slightly different normal forces can be compared: each method
+must give the same mean velocity, share of sticking and counts of events within standard errors.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,9 +23,9 @@ from cosim.studies.report import Report, Row
 from cosim.waveforms.result import Result
 
 NUDGE, APART = 1e-9, 1e-6
-"""Relative changes of the normal force: in the run that shows chaos, and from one member of the
-ensemble to the next."""
-MEMBERS, DURATION, SETTLE = 12, 1.0, 0.5  # runs of an ensemble; s
+"""Relative changes of the normal force: in the test for chaos, and between members of an
+ensemble."""
+MEMBERS, DURATION, SETTLE = 12, 1.0, 0.5  # runs of an ensemble; s; s
 STATISTICS = ("v_average", "stick_fraction", "impacts", "stick_slip_events")
 SCENE = ("drive.pot_max=0.508", "drive.pot_frequency=0.5452", "drive.pot_offset=0.5565")
 """Overrides of the scene ``reference``: three knobs of its signal generator."""
@@ -36,11 +35,11 @@ METHODS = {
     "Gauss-Seidel, 0.1 ms": ("coupling.method=gauss-seidel", "coupling.macro_step=1e-4"),
     "mean current, 0.2 ms": ("coupling.method=mean-current", "coupling.macro_step=2e-4"),
 }
-"""Methods and their overrides; each is compared with the first one."""
+"""Methods and their settings; all are compared with the first."""
 
 
 Ensemble = dict[str, list[float]]
-"""Values of each statistic, one for each member."""
+"""The values of each statistic, one for each member."""
 
 
 def average(values: Sequence[float]) -> tuple[float, float]:
@@ -62,7 +61,7 @@ def solved(scene: Sequence[str], more: Sequence[str], change: float = 0.0) -> Re
 
 
 def growth(scene: Sequence[str], more: Sequence[str] = ()) -> float:
-    """The change of the path (over its range) per relative change of the normal force."""
+    """Largest change of the path, over its range, per relative change of the normal force."""
     path, nudged = (solved(scene, more, c).columns["z_part"] for c in (0.0, NUDGE))
     return float(np.abs(nudged - path).max() / np.ptp(path)) / NUDGE
 
@@ -75,15 +74,15 @@ def ensemble(scene: Sequence[str], more: Sequence[str], members: int) -> Ensembl
         return {name: float(summary[name]) for name in STATISTICS}
 
     found = [member(k) for k in range(members)]
-    return {name: [one[name] for one in found] for name in STATISTICS}
+    return {name: [run[name] for run in found] for name in STATISTICS}
 
 
 def report() -> Report:
-    """Whether methods agree in the statistics of a chaotic scene."""
+    """The report on how far methods agree in the statistics of a chaotic scene."""
     grown = growth(SCENE)
     ensembles = {name: ensemble(SCENE, more, MEMBERS) for name, more in METHODS.items()}
     first = next(iter(ensembles.values()))
-    most = max(apart(first[name], one[name]) for one in ensembles.values() for name in STATISTICS)
+    most = max(apart(first[name], each[name]) for each in ensembles.values() for name in STATISTICS)
     message = (
         f"In a chaotic scene no two paths agree, but the methods' statistics do: {most:.1f} "
         "standard errors apart at most"
@@ -98,13 +97,13 @@ def report() -> Report:
         "distance from the first method's mean, in standard errors of the difference.",
     ]
     raw = [
-        {"method": method, "run": k} | {name: values[k] for name, values in one.items()}
-        for method, one in ensembles.items()
+        {"method": method, "run": k} | {name: values[k] for name, values in found.items()}
+        for method, found in ensembles.items()
         for k in range(MEMBERS)
     ]
     table: list[Row] = [
-        {"method": method} | {name: _cell(one[name], first[name]) for name in STATISTICS}
-        for method, one in ensembles.items()
+        {"method": method} | {name: _cell(found[name], first[name]) for name in STATISTICS}
+        for method, found in ensembles.items()
     ]
     return Report(
         "chaos", "A chaotic scene", raw, notes, {"Ensembles": table},
@@ -123,16 +122,16 @@ _STATISTICS = {
     "impacts": ("impacts", 1.0),
     "stick_slip_events": ("changes of stick and slip", 1.0),
 }
-"""Labels of the statistics, and factors from SI to the labels' units."""
+"""The figure's label of each statistic, and the factor to its unit."""
 
 
 def draw(ensembles: Mapping[str, Ensemble], title: str) -> Picture:
-    """Draw each method's values of each statistic: a tick for each run, and their mean."""
+    """Draw the values of each statistic by method: a tick for each run, and their mean."""
     note = "One tick a run; dot and bar: their mean with two standard errors."
     figure, axes = panels(title, note, (11.0, 3.4), 1, len(_STATISTICS), sharey=True)
     for axis, (statistic, (label, scale)) in zip(axes, _STATISTICS.items(), strict=True):
-        for place, one in enumerate(ensembles.values()):
-            values = [scale * v for v in one[statistic]]
+        for place, found in enumerate(ensembles.values()):
+            values = [scale * v for v in found[statistic]]
             middle, error = average(values)
             axis.plot(values, [place] * len(values), "|", color="0.55", ms=11)
             axis.errorbar(middle, place, xerr=2 * error, fmt="o", color=BLUE, capsize=4, lw=2)

@@ -2,8 +2,8 @@
 
     python -m benchmarks.charts [NAME ...] [--quick] [--out DIR]
 
-draws all, or what is named: ``accuracy``, as ``cosim chart accuracy``, with other programs and
-error-controlled macro steps besides; laws of ``friction``; ``chaos``, a chaotic scene; ``choice``,
+draws all, or the named ones: ``accuracy``, that is ``cosim chart accuracy`` with other programs and
+error-controlled macro steps added; laws of ``friction``; ``chaos``, a chaotic scene; ``choice``,
 which circuit model and tolerance to take. Each writes ``.csv``, ``.md`` and ``.png``.
 """
 
@@ -71,7 +71,7 @@ method = "redo"
 
 
 def _redone(scene: Scene, case: Case, reltol: float) -> Outcome:
-    """The machine as a foreign FMU: the coupling then does not know its time to the next impact."""
+    """The machine as an FMU of any kind, which does not predict its impacts: steps are redone."""
     times = case.times()
     given = f"run.duration={case.duration!r}", f"run.output_step={times[0]!r}"
     with TemporaryDirectory() as name:
@@ -96,10 +96,11 @@ def _values(first: int, last: int, case: Case) -> list[float]:
 def _controlled(
     joint: Joint, jumps: Jumps, case: Case, tolerance: float, audited: bool
 ) -> Iterator[int]:
-    """Error-controlled macro steps that end at jumps of the command and at samples.
+    """Macro steps by Richardson's estimate, cut at jumps of the command and at sampling times.
+    Yields the number of macro steps so far at each sampling time; an attempt takes three.
 
-    With an audit the power residual may be half of tolerance^(2/3) of the power: the residual is of
-    order 2 in the step, which scales with the cube root of the tolerance.
+    An audit allows a residual of 0.5 tolerance^(2/3) of the power, since the residual is of order 2
+    in the step, and the step is proportional to the cube root of the tolerance.
     """
     share = 0.5 * tolerance ** (2.0 / 3.0) if audited else None
     control = ErrorControlled(joint, 1e-5, tolerance, tolerance, shortest=1e-9, energy_share=share)
@@ -130,7 +131,7 @@ SOLVERS = (
     _peer("all in ngspice", "circuit.reltol", _all_in_ngspice, partial(_values, 4, 9)),
     _peer("SciPy's LSODA with events", "tolerance", _solve_ivp, partial(_values, 3, 6)),
 )
-"""Solvers that the chart ``accuracy`` shows beside those of the study."""
+"""Lines of the chart ``accuracy`` besides the study's own."""
 
 
 CHARTS: dict[str, Callable[[bool, Path], Report]] = {
@@ -139,7 +140,7 @@ CHARTS: dict[str, Callable[[bool, Path], Report]] = {
     "chaos": lambda *_: chaos.report(),
     "choice": lambda quick, out: choice.choice(quick, out),
 }
-"""Each takes whether it is quick, and the folder from which an interrupted one resumes."""
+"""The arguments are ``quick`` and the folder, in which an interrupted chart is resumed."""
 
 
 def main() -> None:

@@ -1,8 +1,8 @@
 """Which circuit model and tolerance to take: error and CPU time over settings of the knobs.
 
-The solver's error is measured against the same model with much shorter steps; the whole error
-against the schematic ("full") with such steps. Only settings with regular motion count: elsewhere
-the start, or the ninth digit, decides.
+The solver's error is taken against the same model with much shorter steps, the whole error against
+the schematic ("full") with such steps. Only settings with regular motion have errors: in others the
+start, or the ninth digit of a setting, determines the mean velocity.
 """
 
 from collections import Counter
@@ -31,36 +31,33 @@ from cosim.toolchain.processes import in_place
 from cosim.version import __version__
 
 SETTINGS, QUICK, TIMED = 18, 2, 2
-"""Settings of each machine: in all, with ``quick``, and those that are timed."""
+"""Settings of each machine: drawn, drawn if ``quick``, and timed (the first regular ones)."""
 
 KNOBS = ("drive.frequency", "drive.amplitude", "drive.offset")
 LOW, HIGH = np.array([10.0, 3.0, -3.0]), np.array([90.0, 10.0, 3.0])
-"""Ranges of the knobs, Hz and V; with larger offsets the part mostly sticks."""
+"""Ranges of KNOBS, Hz, V, V; with larger offsets the part mostly stays."""
 
 BASE = changed(load("reference"), {"run.duration": 1.0, "run.settle": 0.5}, "choice")
-"""The scene that settings change; runs are at least as long, in whole periods."""
+"""The scene that all settings change; runs in whole periods are at least as long."""
 
 OWN, COST, ALL = "own model", "CPU time over amplifier's", "all"
 SHARES = {"median": 0.5, "90 %": 0.9, "worst": 1.0}
-"""Quantiles of the error over the regular settings, by their words in the tables."""
+"""Quantiles of the error over the regular settings, by their names in the tables."""
 
 LEAST, MOST = 1e-5, 1e3
-"""Range of the errors in the figure, %; smaller ones are drawn at its lower end."""
+"""Range of the figure, %; smaller errors are drawn at LEAST, larger ones are not drawn."""
 
 
 def of(line: str, *every: Settings) -> dict[str, Settings]:
-    """The settings of a line of the figure, a circuit model with or without a solver, for each of
-    several step settings, by the line's name and these in words; ``{}`` is "default"."""
+    """The settings of a line of the figure, named by the line and their steps; ``{}``: default."""
     model, _, solver = line.partition(", ")
     own: Settings = {"circuit.model": model, **({"run.solver": solver} if solver else {})}
-    words = [", ".join(f"{key} = {value:.2g}" for key, value in one.items()) for one in every]
-    return {
-        f"{line}: {w or 'default'}": {**own, **one} for w, one in zip(words, every, strict=True)
-    }
+    words = [", ".join(f"{key} = {value:.2g}" for key, value in x.items()) for x in every]
+    return {f"{line}: {w or 'default'}": {**own, **x} for w, x in zip(words, every, strict=True)}
 
 
 def steps(longer: float) -> Settings:
-    """Settings with steps of ngspice ``longer`` times as long, reltol scaled with the cube."""
+    """Steps of ngspice ``longer`` times the default; the tolerance grows with their cube."""
     reltol, max_step = BASE.circuit.reltol, BASE.circuit.max_step
     return {"circuit.reltol": reltol * longer**3, "circuit.max_step": max_step * longer}
 
@@ -74,22 +71,22 @@ CHOICES = {
     **of(JUDGES, steps(3.0), steps(1.7), {}, steps(0.5)),
     **of(COMPLETE, steps(3.0), steps(1.7), {}),
 }
-"""All settings that are compared, each line from coarse to fine."""
+"""The compared settings, each line from coarse to fine."""
 DEFAULT = f"{JUDGES}: default"
 
 FINEST = {"ideal": {"mechanics.tolerance": 1e-12}, SEARCHES: {"mechanics.tolerance": 1e-12}}
 FINEST |= {JUDGES: steps(1.0 / 4.0), COMPLETE: steps(1.0 / 3.0)}
-TRUTHS: dict[str, Settings] = {m: {"circuit.model": m, **one} for m, one in FINEST.items()}
-"""Settings of each model that give the reference values for errors."""
+TRUTHS: dict[str, Settings] = {m: {"circuit.model": m, **fine} for m, fine in FINEST.items()}
+"""The settings of each model with the finest steps, against which errors are taken."""
 
 
 def machines() -> dict[str, Settings]:
-    """Settings of each machine on top of BASE. The amplifier of `reference` gets the data sheet's
-    swing losses, as `paper` has them: else its error would be that of a parameter."""
+    """The machines as changes of BASE. All have the data sheet's swing losses in the amplifier, as
+    the scene `paper`: otherwise a parameter, not the model, would make its error."""
     base, paper = BASE.as_dict(), load("paper").as_dict()
     tables = ("circuit", "coil", "mechanics", "friction")
-    every = [(table, key, value) for table in tables for key, value in paper[table].items()]
-    rig = {f"{table}.{key}": value for table, key, value in every if base[table].get(key) != value}
+    keys = [(table, key, value) for table in tables for key, value in paper[table].items()]
+    rig = {f"{table}.{key}": value for table, key, value in keys if base[table].get(key) != value}
     losses = {key: value for key, value in rig.items() if key.startswith("circuit.swing_loss")}
     return {
         f"{name}, {contact}": {**own, "mechanics.contact": contact}
@@ -102,7 +99,7 @@ def choice(quick: bool, out: Path) -> Report:
     """The error of v_average and the CPU time of each circuit model at each tolerance, on settings
     of the knobs drawn at random, and what to take for 10, 1 and 0.1 %; ``quick``: few settings.
 
-    It leaves what ``Report.save`` writes in ``out``, and takes up what an interrupted one left.
+    It leaves what ``Report.save`` writes in ``out``, and resumes an interrupted call.
     """
     path = out / "choice.sqlite"
     with Evaluator(BASE, path, whole_periods=True, kept=("v_average",)) as bench:
@@ -113,7 +110,7 @@ def choice(quick: bool, out: Path) -> Report:
 
 
 def measure(bench: Evaluator, draws: int) -> Report:
-    """Measure all choices on ``draws`` settings of each machine; ``bench`` runs them."""
+    """The report on ``draws`` settings of each machine, which ``bench`` runs."""
     cube = qmc.Sobol(len(KNOBS), rng=np.random.default_rng(0)).random_base2(5)[:draws]
     drawn = [
         (machine, {**own, **dict(zip(KNOBS, row, strict=True))})
@@ -124,17 +121,17 @@ def measure(bench: Evaluator, draws: int) -> Report:
     kinds: dict[str, Counter[str]] = {machine: Counter() for machine in machines()}
     for (machine, _), kind in zip(drawn, motions, strict=True):
         kinds[machine][kind] += 1
-    regular = [one for one, kind in zip(drawn, motions, strict=True) if kind == "regular"]
-    every = CHOICES | TRUTHS
+    regular = [pair for pair, kind in zip(drawn, motions, strict=True) if kind == "regular"]
+    variants = CHOICES | TRUTHS
     asked = [
         (what, n, settings)
         for n, (_, own) in enumerate(regular)
-        for what, one in every.items()
-        if _able(settings := {**own, **one})
+        for what, change in variants.items()
+        if _able(settings := {**own, **change})
     ]
     timed = [s for m in kinds for s in [own for name, own in regular if name == m][:TIMED]]
-    # v_average by choice: NaN where it cannot run, inf where the run failed.
-    found = {what: np.full(len(regular), nan) for what in every}
+    # v_average by variant and regular setting; NaN: not able, inf: failed.
+    found = {what: np.full(len(regular), nan) for what in variants}
     for k, outcome in bench.run((k, settings) for k, (*_, settings) in enumerate(asked)):
         what, n, _ = asked[k]
         found[what][n] = outcome.numbers.get("v_average", inf)
@@ -146,13 +143,13 @@ def measure(bench: Evaluator, draws: int) -> Report:
             costs[what].append(second / taken[DEFAULT])
     rows: list[Row] = []
     for machine in (*kinds, ALL):
-        chosen = np.array([machine in (ALL, name) for name, _ in regular], bool)
+        of_machine = np.array([machine in (ALL, name) for name, _ in regular], bool)
         for what, own in CHOICES.items():
             model = str(own["circuit.model"])
             row = {"machine": machine, "circuit.model": model, "steps": what.partition(": ")[2]}
             row |= {"line": what.partition(":")[0], COST: float(np.median(costs[what]))}
             for against, truth in {OWN: model, JUDGES: JUDGES, COMPLETE: COMPLETE}.items():
-                pairs = zip(found[what][chosen], found[truth][chosen], strict=True)
+                pairs = zip(found[what][of_machine], found[truth][of_machine], strict=True)
                 errors = np.sort([100.0 * relative_error(v, true) for v, true in pairs])
                 errors = errors[~np.isnan(errors)]  # where the fast solver cannot run
                 row["regular settings"] = len(errors)
@@ -164,7 +161,7 @@ def measure(bench: Evaluator, draws: int) -> Report:
 
 
 def _able(settings: Settings) -> bool:
-    """Whether the solver of settings can run them: the fast one has no rigid walls."""
+    """Whether the solver can run the settings: the fast one has no rigid walls."""
     return "run.solver" not in settings or settings["mechanics.contact"] == "compliant"
 
 
@@ -178,12 +175,12 @@ def _kind(settings: Settings) -> str:
 
 
 def _time(own: Settings) -> dict[str, float]:
-    """CPU time (s) of each choice for a simulated second, one after the other in this process; the
-    fast solver's is that of a full batch over its LANES runs."""
+    """CPU time of each choice for a simulated second, s, in turns in this process; the fast solver
+    runs LANES settings at once."""
     calls: dict[str, Callable[[], object]] = {}
-    for what, one in CHOICES.items():
-        if _able({**own, **one}):
-            scene = point(BASE, {**own, **one}, True)
+    for what, choice in CHOICES.items():
+        if _able({**own, **choice}):
+            scene = point(BASE, {**own, **choice}, True)
             many = partial(summaries, [scene] * LANES)
             calls[what] = partial(summary, scene) if scene.run.solver == "fmu" else many
     with in_place():
@@ -198,21 +195,21 @@ def _column(against: str, share: str) -> str:
 
 def advice(rows: Sequence[Row], wanted: float) -> Row:
     """The cheapest choices whose error against the schematic is at most ``wanted``, %."""
-    told: Row = {"error wanted [%]": wanted}
+    found: Row = {"error wanted [%]": wanted}
     for words, share in (("in half of the settings", "median"), ("in nine of ten", "90 %")):
         good = [row for row in rows if row[_column(COMPLETE, share)] <= wanted]
         best = min(good, key=lambda row: row[COST], default={COST: nan})
-        told[words] = f"{best['line']}, {best['steps']}" if good else "none"
-        told[f"{words}: {COST}"] = best[COST]
-    return told
+        found[words] = f"{best['line']}, {best['steps']}" if good else "none"
+        found[f"{words}: {COST}"] = best[COST]
+    return found
 
 
 def report(rows: Sequence[Row], kinds: Mapping[str, Counter[str]], second: float) -> Report:
-    """The report of the rows of each machine and of ALL, of the number of settings with each kind
-    of motion, and of the CPU time (s) of DEFAULT for a simulated second."""
-    every = [row for row in rows if row["machine"] == ALL]
-    told = [advice(every, wanted) for wanted in (10.0, 1.0, 0.1)]
-    default = {row["line"]: row for row in every if row["steps"] == "default"}
+    """The report, of the ``rows`` of each machine and of ALL, the number of settings with each kind
+    of motion, and the CPU time of DEFAULT for a simulated ``second``, s."""
+    overall = [row for row in rows if row["machine"] == ALL]
+    advised = [advice(overall, wanted) for wanted in (10.0, 1.0, 0.1)]
+    default = {row["line"]: row for row in overall if row["steps"] == "default"}
     half = {line: brief(row[_column(COMPLETE, "median")]) for line, row in default.items()}
     cost = brief(default[SEARCHES][COST])
     title = (
@@ -231,18 +228,18 @@ def report(rows: Sequence[Row], kinds: Mapping[str, Counter[str]], second: float
         f"side in one process, medians; that took {second:.2g} s for a simulated second.",
     ]
     names = sorted(set().union(*kinds.values()))
-    counts = [{"machine": m} | {name: one[name] for name in names} for m, one in kinds.items()]
+    counts = [{"machine": m} | {name: count[name] for name in names} for m, count in kinds.items()]
     hidden = ("machine", "line", "version")
-    shown = [{key: row[key] for key in row if key not in hidden} for row in every]
+    shown = [{key: row[key] for key in row if key not in hidden} for row in overall]
     return Report(
         "choice", "Which circuit model, which tolerance", rows, notes,
-        {"What to take": told, "All machines": shown, "Kinds of motion": counts},
-        {"": partial(draw, every, title)}, "\n".join([f"{title}.", "", *markdown(told)]),
+        {"What to take": advised, "All machines": shown, "Kinds of motion": counts},
+        {"": partial(draw, overall, title)}, "\n".join([f"{title}.", "", *markdown(advised)]),
     )  # fmt: skip
 
 
 def draw(rows: Sequence[Row], title: str) -> Picture:
-    """Draw error over cost, in two panels: the solver's error alone, and the whole error."""
+    """Draw error over cost: of the solver alone, and of model and solver."""
     note = (
         "A line from coarse to fine steps; ring: default. Solid: the median; dotted: the worst. "
         f"What is less stands at {LEAST:g} %."

@@ -1,7 +1,5 @@
-"""CPU time of what users would write themselves (peers), over ours, on `reference` and `dc-motor`.
-
-Each peer runs at its coarsest setting whose error is no larger than ours, or else at the setting
-with its least error.
+"""CPU time of programs that users might write ("peers") over ours, on the scenes `reference` and
+`dc-motor`. Each peer runs at its coarsest setting whose error is at most ours, or at its best one.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,14 +16,14 @@ from cosim.simulation.simulate import simulate
 from cosim.studies.speed.bench import cpu, ratios
 
 Peer = Callable[[], tuple[float, Array]]
-"""Runs a peer; gives its CPU seconds and the part's heights, m (or a speed)."""
+"""Runs a peer; returns the CPU time, s, and the part's heights, m, or the motor's speed."""
 
 LSODA_ERROR = 5e-4
 """The error at which LSODA is compared, larger than ours: a smaller one only costs more."""
 
 
 def compare(rounds: int) -> dict[str, Any]:
-    """For each peer the spread of its time over ours, with the errors of both."""
+    """Spread of the ratio of each peer's time to ours, and the errors of both."""
     ours, wanted = brief(), own_error("amplifier", "amplifier")
 
     in_ngspice = (brief(f"circuit.reltol={x}", "circuit.max_step=1e-4") for x in (1e-7, 1e-8, 3e-9))
@@ -48,7 +46,7 @@ def compare(rounds: int) -> dict[str, Any]:
 
 
 def _motor(rounds: int) -> dict[str, Any]:
-    """The peer `naive` on the scene `dc-motor` until its bridge changes the duty; errors are of the
+    """The ratio on the scene `dc-motor`, up to the change of its bridge's duty. Errors are of the
     speed, over its range, against our own run with steps 50 times shorter."""
 
     def scene(step: float, reltol: float = 1e-7) -> Scene:
@@ -75,8 +73,8 @@ def _over(
     target: float,
     rounds: int,
 ) -> dict[str, Any]:
-    """The spread of a peer's time over ours, and its error, at the first of its ``settings`` whose
-    error is at most ``target``, or else at that with the least error."""
+    """The spread of the ratio of a peer's time to ours, and the peer's error, at the first of its
+    settings whose error is at most ``target``, or else at the one with the least error."""
     reached = []
     for peer in settings:
         reached.append(error(peer()[1]))

@@ -2,17 +2,17 @@
 
 After Schierz, Arnold and Clauß, "Co-simulation with communication step size control in an FMI
 compatible master algorithm", 9th Modelica Conference 2012, doi 10.3384/ecp12076205. Two steps of H
-are compared with one of 2H from the same start: for a method whose inputs are extrapolated with
-degree k, their difference over 2^(k+1) - 1 is the local error of the two (Richardson).
+are compared with one of 2H from the same start. If a method extrapolates inputs with degree k, the
+difference of the results over 2^(k+1) - 1 estimates the error of the two steps (Richardson).
 
 The next step is H (tolerance / error)^(1 / (k + 2)), within bounds. The audit compares the power
-that one side assumes to have delivered with the power that the other received (Sadjina et al.,
+that one side gives, by its extrapolated input, with what the other side takes (Sadjina et al.,
 "Energy conservation and power bonds in co-simulations", Eng. Comput. 33 (2017) 607, doi
-10.1007/s00366-016-0492-8) and rejects a step whose residual is too large a share of the greatest
+10.1007/s00366-016-0492-8), and rejects a step whose residual is too large a share of the greatest
 power so far.
 
-Known limits: needs participants that can repeat a step, so ngspice cannot take part; at an event
-the step shrinks very much, so use it where the solution is smooth, or cut steps at events first.
+Known limits: participants must be able to repeat a step, which ngspice cannot; at an event the step
+shrinks until the jump is within the tolerance, so macro steps should be cut at events first.
 """
 
 import numpy as np
@@ -37,7 +37,7 @@ class ErrorControlled:
         safety: float = 0.8,
         shortest: float = 1e-12,
     ) -> None:
-        """``step`` (s) is the first one that is tried.
+        """``step`` (s) is the first macro step that is tried.
 
         The error of each output y is scaled by ``absolute + relative |y|``; an infinite entry of an
         array ``absolute`` leaves that output out. With ``energy_share`` the audit is on: the power
@@ -51,18 +51,18 @@ class ErrorControlled:
         self._safety, self._shortest = safety, shortest
         self._power = 0.0
         self.accepted = 0
-        """Accepted macro steps."""
+        """Macro steps that were accepted."""
         self.rejected = 0
-        """Tries of two macro steps that were undone, for the error or the audit."""
+        """Attempts that were undone, for the error or the audit."""
         self.rejected_by_audit = 0
 
     def run(self, end: float) -> None:
-        """Advance to ``end`` (s, the method's own time)."""
+        """Advance to the time ``end`` of the method, s."""
         while (left := end - self.method.time) > 1e-12 * end:
             self._try(min(self._h, left / 2.0))
 
     def _try(self, h: float) -> None:
-        """Try two macro steps of ``h`` (s), compare with one of 2 ``h``, and adapt the step."""
+        """Try two steps of ``h``; undo them if they fail. Chooses the next step either way."""
         method, known = self.method, self._power
         saved = method.save()
         method.step(2.0 * h)
@@ -76,7 +76,7 @@ class ErrorControlled:
         off = (twice - once) / (2.0**self._order - 1.0)
         share = off / (self._absolute + self._relative * np.abs(twice))
         error = float(np.sqrt(np.mean(share**2)))
-        # In the first step from rest all power is residual, so the audit leaves it out.
+        # The first step from rest is not audited: with no power before it, all is residual.
         honest = not self._energy_share or not known or residual <= self._energy_share * self._power
         factor = self._safety * error ** (-1.0 / (self._order + 1)) if error else _MOST_CHANGE
         self._h = h * min(_MOST_CHANGE, max(_LEAST_CHANGE, factor))

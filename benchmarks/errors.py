@@ -1,9 +1,9 @@
 """Errors of our runs at the settings at which they are timed, and the growth of the cost.
 
-The errors of ``amplifier``, ``ideal`` and ``limited`` are those of the part's path in the scene
-`reference`, against the monolithic reference solution (``reference.json``; for ``limited`` that of
-the amplifier). ``full`` is compared with finer steps, since the schematic has no reference, and the
-part alone with the closed form of its mean velocity.
+For ``amplifier``, ``ideal`` and ``limited`` it is that of the part's path in the scene `reference`,
+against the monolithic reference solution (``reference.json``; for ``limited`` that of the
+amplifier). ``full`` is compared with finer steps, since there is no reference of the schematic, and
+the part alone with the closed form of its mean velocity.
 """
 
 import json
@@ -28,7 +28,7 @@ _FINER = ("circuit.reltol=1e-6", "circuit.max_step=5e-6")
 
 
 def of_rungs() -> dict[str, float]:
-    """The error of each rung."""
+    """The relative error of each rung."""
     return {
         "full": _error_of_full(),
         "amplifier": own_error("amplifier", "amplifier"),
@@ -43,7 +43,7 @@ def cost_exponent(rounds: int, periods: Sequence[int]) -> dict[str, Any]:
     calls = {
         str(n): partial(simulate, load("reference", [f"run.duration={n / 20}"])) for n in periods
     }
-    costs = np.log([*take_turns(calls, rounds).values()])
+    costs = np.log([*take_turns(calls, rounds).values()])  # durations × rounds
     exponents = np.polyfit(np.log(periods), costs, 1)[0]
     return {**spread(exponents.tolist()), "periods": list(periods)}
 
@@ -59,7 +59,7 @@ def times() -> list[float]:
 
 
 def brief(*overrides: str) -> Scene:
-    """The scene `reference` over the time of its reference solution, with a row at each time."""
+    """The scene `reference` as long as its reference solution, with a row at each of its times."""
     return load("reference", [*BRIEF, "run.output_step=1e-3", *overrides])
 
 

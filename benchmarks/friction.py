@@ -1,14 +1,14 @@
-"""Laws of friction side by side, on a part that a vibrating surface holds: creep and cost.
+"""Friction laws compared on a part that a vibrating surface holds: creep and cost.
 
 A part of the scene ``reference`` begins to slip down at 20 mm/s, comes to rest on the surface,
-which moves up and down at 40 Hz with 15 m/s², and is then held at six tenths of what static
-friction can carry. Each law is solved as its users do, by SciPy's LSODA. Creep is what a held part
-still slips: by set-valued Coulomb friction, nothing.
+which moves up and down at 40 Hz with 15 m/s², and is then held with six tenths of the largest
+static friction. Each law is solved as its users do, by SciPy's LSODA. Creep is the mean slip
+velocity of the held part; with set-valued Coulomb friction it is 0.
 
 ``tanh``    F = µ(u) F_n tanh(u/v0), with µ falling from µ_s to µ_k over 30 v0
 ``Karnopp`` within a band of velocity friction balances the load (Karnopp, "Computer simulation of
             stick-slip friction", J. Dyn. Syst. Meas. Control 107 (1985) 100); a solver that chooses
-            its own steps cannot reset the velocity there, so what is left of it stays
+            its own steps cannot reset the velocity there, so the remaining velocity stays
 ``LuGre``   a bristle of stiffness σ0 and damping σ1 (Canudas de Wit et al., "A new model for
             control of systems with friction", IEEE Trans. Autom. Control 40 (1995) 419)
 """
@@ -32,26 +32,25 @@ from cosim.studies.plots import BLUE, GREEN, VERMILION, panels
 from cosim.studies.report import Report, Row, span
 
 CREEP, ERROR = "creep of a held part [µm/s]", "error in the machine / range"
-"""Columns of the table, and labels of the figure's axes."""
+"""Names of columns, and labels of the figure's axes."""
 
 FREQUENCY, ACCELERATION, SLIP = 40.0, 15.0, 0.02
-"""Of the surface, Hz and m/s²; initial velocity of the surface relative to the part, m/s."""
-SETTLED, DURATION = 0.5, 1.0  # s; creep is measured between these times
-_RTOL = 1e-8  # relative tolerance of LSODA
+"""The surface's vibration, Hz and m/s²; initial slip velocity of the part, m/s."""
+SETTLED, DURATION = 0.5, 1.0  # s; creep is measured between them
+_RTOL = 1e-8
 
 Law = Callable[[float, float, float], tuple[float, float]]
-"""Friction (N) and the rate (m/s) of the bristle's deflection, from the slip velocity u (m/s), the
-deflection z (m), and the friction (N) that would make the part follow the surface."""
-
+"""Friction (N) and rate of the bristle's deflection (m/s), from slip velocity u (m/s), deflection z
+(m), and the load (N), which is the friction that would keep the part on the surface."""
 
 LAWS = {"tanh": (1e-3, 1e-4, 1e-5), "Karnopp": (1e-3, 1e-4, 1e-5), "LuGre": (1e4, 1e5, 1e6)}
-"""Laws with their widths: m/s, or N/m for the bristle's stiffness."""
+"""Laws and their widths in slip velocity, m/s; for LuGre stiffnesses of the bristle, N/m."""
 COULOMB = "set-valued Coulomb"
 _RTOL_IN_THE_MACHINE = 1e-6
 
 
 def report() -> Report:
-    """The errors of smoothed friction laws, on a held part and in the machine."""
+    """The report on the effect of smoothed friction laws on a held part and in the machine."""
     moved = {(row["law"], row["width"]): row for row in in_the_machine()}
     nothing = {ERROR: nan, "CPU time [s]": nan}
     rows = [row | moved.get((row["law"], row["width"]), nothing) for row in creep()]
@@ -82,7 +81,7 @@ def report() -> Report:
 def law_of(name: str, width: float, scene: Scene) -> Law:
     """A smoothed law with a scene's coefficients; ``width`` as in :data:`LAWS`."""
     f, mu_s, mu_k = scene.friction.normal_force, scene.friction.mu_s, scene.friction.mu_k
-    damping = 2.0 * sqrt(width * scene.mechanics.part_mass)  # critical, for a bristle's stiffness
+    damping = 2.0 * sqrt(width * scene.mechanics.part_mass)  # critical: of part and bristle
 
     def falling(u: float, over: float) -> float:
         """Coefficient of friction: static at 0, kinetic beyond the slip velocity ``over``, m/s."""
@@ -105,28 +104,27 @@ def law_of(name: str, width: float, scene: Scene) -> Law:
 
 
 class _Smoothed(Machine):
-    """The machine with a smoothed law of friction; the last state is the bristle's deflection."""
+    """The whole machine with a smoothed law instead of modes; the last state is the bristle's."""
 
     scales = np.append(Machine.scales, 1e-6)
 
     def __init__(self, scene: Scene, drive: Command, law: Law) -> None:
         super().__init__(scene, drive)
         self._law = law
-        self.slip = 1  # never held by a mode
+        self.slip = 1  # the mode of slipping, for good
 
     def friction(self, y: Any, held: float) -> list[float]:
         return list(self._law(y[U], y[-1], held))
 
     def choose_friction(self, y: Any) -> None:
-        """There is nothing to choose."""
+        """The mode does not change."""
 
     def friction_event(self, y: Any) -> float:
         return 1.0
 
 
 def in_the_machine() -> Iterator[Row]:
-    """For each law the error of the part's path on the scene ``stick-slip``, over its range, and
-    the CPU time, s."""
+    """A row a law: error of the part's path in ``stick-slip``, over its range; CPU time, s."""
     case = CASES["stick-slip"]
     scene = load("reference", [*case.overrides, f"run.duration={case.duration!r}"])
 
@@ -147,7 +145,7 @@ def _width(name: str, width: float) -> str:
 
 
 def creep() -> Iterator[Row]:
-    """For each law creep (µm/s), error of the position of rest (µm), number of evaluations."""
+    """A row for each law: creep (µm/s), error of the position of rest (µm), evaluations."""
     rig = load("reference")
     truth = _stops(rig)
 
@@ -164,7 +162,7 @@ def creep() -> Iterator[Row]:
 
 
 def _stops(scene: Scene) -> float:
-    """Slip (m) until a part with set-valued friction is at rest: a closed form in the time of rest.
+    """Slip (m) until a part with set-valued friction is at rest, in closed form but for the time.
 
     With Ω the surface's angular frequency, the slip velocity is
     u = u0 + (A/Ω) sin Ωt - (force/m - g) t.

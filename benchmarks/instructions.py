@@ -1,7 +1,7 @@
-"""Instructions that the FMU executes, counted by callgrind: a measure without noise.
+"""Instructions that the FMU executes, counted by callgrind: a measure of cost without noise.
 
-The mechanics of the scene `reference` get its command as a current, in fixed steps about as long as
-those of ngspice; ``replay.c`` calls the FMU.
+The mechanics of the scene `reference` get a current proportional to its command, in fixed steps
+about as long as ngspice's; ``replay.c`` calls them.
 """
 
 import re
@@ -50,14 +50,14 @@ def per_period() -> int | None:
 
 
 def _write(path: Path) -> None:
-    """The file of communication points that ``replay.c`` describes."""
+    """Write the file of communication points whose layout ``replay.c`` describes."""
     scene = load("reference")
     drive, known = command(scene), references(3)
     reals, integers = parameters(scene)
     h = 1 / (scene.drive.frequency * STEPS_PER_PERIOD)
     starts = h * np.arange(PERIODS * STEPS_PER_PERIOD)
     current = drive.values(starts) / scene.circuit.sense_resistance
-    slope = np.full(len(starts), (drive.value(2 * h) - drive.value(h)) / h)
+    slope = np.full(len(starts), (drive.value(2 * h) - drive.value(h)) / h)  # the sawtooth's ramp
     slope /= scene.circuit.sense_resistance
     names = (*reals, *integers, "current", "current_slope", "back_emf", "back_emf_slope")
     head = [len(reals), len(integers), len(starts), *(known[name] for name in names)]

@@ -29,18 +29,18 @@ MORE = {"best": 1.05, "robust": 1.08}
 POPULATION = {"best": 60, "robust": 24}
 GENERATIONS = {"best": 60, "robust": 30}
 APART, JUDGED, NOTHING = 0.03, 4, -1e3
-"""Least distance (in the cube) and number of the points that are judged; the score of a point that
-cannot be run."""
+"""Least distance of the judged points, in the unit cube; their number; the score of infeasible
+points."""
 
 
 def searched(bench: Bench, change: Change, number: int, kind: str, seed: int) -> float:
-    """The best judged value of a change for goal ``number``, in the goal's unit; 0 without any."""
+    """The best value of a change for a goal, in the goal's unit; 0 where nothing was found."""
     machine, goal = change.machine(bench.scene), GOALS[number]
     scores_of = bench.once(machine) if kind == "best" else bench.over_turns(machine)
     seen: list[tuple[float, list[float]]] = []
 
     def cost(columns: Array) -> Array:
-        """Negative scores of points (keys × points), rounded to the knobs' steps."""
+        # SciPy passes keys × points; scores are points × goals.
         points = np.round(columns.T * STEPS) / STEPS
         scores, feasible = scores_of(points)
         found = scores[:, number]
@@ -56,8 +56,8 @@ def searched(bench: Bench, change: Change, number: int, kind: str, seed: int) ->
     points = np.array([point for score, point in sorted(seen, reverse=True) if score > 0.0][:400])
     if not len(points):
         return 0.0
-    some = points[apart(points, APART, JUDGED)].tolist()
-    candidates = {kind: [some if k == number else [] for k in range(len(GOALS))]}
+    best = points[apart(points, APART, JUDGED)].tolist()
+    candidates = {kind: [best if k == number else [] for k in range(len(GOALS))]}
     found = judged(bench, {change.name: machine}, {change.name: candidates}, (kind,))
     point = found.get((change.name, goal.name, kind))
     return point.rank(kind) * goal.scale if point else 0.0

@@ -1,4 +1,4 @@
-"""The part on a given surface: the exact solution beside the published trials' own scheme."""
+"""The part on a given surface: speed of the exact solution against the published trials' scheme."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -17,18 +17,18 @@ from cosim.trials.camera import frame_times, heights, velocities
 from cosim.trials.tracked import Track, Trial, read_folder
 
 FRAMES = 312
-"""Frames of a made-up trial: as many as the published ones have."""
+"""Frames of a simulated trial, as many as the published ones have."""
 OTHER_FORCE = 14.0
-"""Normal force, in weights of the part, on a trial that is not among the published ones."""
+"""Normal force of trials that are not published, in weights of the part."""
 
 
 def solvers(folder: Path | None, rounds: int) -> dict[str, Any]:
     """CPU seconds (medians) of the exact solution and of the authors' scheme for all trials, and
     the spread of their ratio.
 
-    The compiled routines are called directly, with buffers made beforehand, on the trials of
-    ``folder`` or, without one, on simulated trials as a camera sees them. The exact solution gives
-    heights at the tracked times, the published scheme at its own steps.
+    Both compiled functions are called directly, with buffers made beforehand, on the trials of
+    ``folder`` or, without one, on simulated trials. The exact solution gives heights at the tracked
+    times, the published scheme at its own steps.
     """
     trials = [_made_up(k) for k in range(10)] if folder is None else read_folder(folder)
     calls = {name: [_call(trial, name == "exact") for trial in trials] for name in _SOLVERS}
@@ -46,7 +46,7 @@ _SOLVERS = ("exact", "published")
 
 
 def _call(trial: Trial, exact: bool) -> Callable[[], int]:
-    """A call of a compiled solver on a trial without first and last rows, as the authors do."""
+    """A call of a compiled solver on a trial, without its first three and its last two rows."""
     rows = slice(3, len(trial.time) - 2)
     time = np.ascontiguousarray(trial.time[rows] - trial.time[3])
     surface = np.ascontiguousarray(trial.platform.v[rows])
@@ -65,13 +65,14 @@ def _call(trial: Trial, exact: bool) -> Callable[[], int]:
         solve = library("part").part_threshold
         asked = (part.PUBLISHED_STEP, part.PUBLISHED_V_MIN, steps)
 
-    def call(_: object = (time, surface, law, motion)) -> int:  # the default keeps them alive
+    def call(_: object = (time, surface, law, motion)) -> int:  # keeps the buffers alive
         return solve(*given, *asked, *found)
 
     return call
 
 
 def _made_up(number: int) -> Trial:
+    """A trial as the camera sees a simulated run; each number starts 3 ms later."""
     scene = load("reference", ["circuit.model=ideal", "run.duration=0.8", "run.settle=0.4"])
     waves, time = simulate(scene).columns, frame_times(0.4 + 0.003 * number, FRAMES)
     seen = (heights(waves, body, time, 0.0) for body in ("surface", "part"))

@@ -1,7 +1,7 @@
-"""The cost of the coupling: CPU time of a coupled run over that of circuit and mechanics alone.
+"""The cost of coupling: CPU time of a coupled run over that of circuit and mechanics alone.
 
 The circuit alone gets the back-EMF of the coupled run from a table, so that ngspice takes the same
-steps; the mechanics alone get the coupled run's current.
+steps; the mechanics alone get the current of the coupled run.
 """
 
 from contextlib import closing
@@ -33,18 +33,18 @@ def measure(rounds: int) -> dict[str, Any]:
 
 
 def coupled_over_parts(scene: Scene, rounds: int) -> dict[str, Any]:
-    """Spread of the ratio, and the numbers of steps of the coupled and of the replayed circuit."""
+    """Spread of the ratio, and the steps of the circuit in the coupled run and alone."""
     log = _coupled(scene).log()
-    told = _replay(scene)  # must outlive all runs of the circuit
+    table = _replay(scene)
     # Each call makes its own instance, as both sides of the ratio need one.
     calls = {
         "coupled": lambda: _coupled(scene),
-        "circuit": lambda: _coupled(scene, told),
+        "circuit": lambda: _coupled(scene, table),
         "mechanics": lambda: _mechanics(scene, log),
     }
     taken = take_turns(calls, rounds)
     parts = [a + b for a, b in zip(taken["circuit"], taken["mechanics"], strict=True)]
-    replayed = _coupled(scene, told).steps
+    replayed = _coupled(scene, table).steps
     return {
         **ratios(taken["coupled"], parts),
         "steps": len(log["time"]) - 1,
@@ -62,8 +62,8 @@ def _coupled(scene: Scene, told: Array | None = None) -> Lead:
 
 
 def replay(circuit: Lead, told: Array) -> None:
-    """Make a circuit run without mechanics: ``told`` has a row for each of its steps with back-EMF
-    (V), its slope (V/s) and the time of the next impact (s), and must outlive the run."""
+    """Let a circuit run without mechanics. The rows of ``told``, one for each of its steps, are
+    back-EMF (V), its slope (V/s) and the next impact (s); the array must outlive the run."""
     circuit.state.macro_point = address("macro_point_replayed")
     circuit.state.replay = told.ctypes.data
 
@@ -76,7 +76,8 @@ def _mechanics(scene: Scene, log: Log) -> None:
 
 
 def _replay(scene: Scene) -> Array:
-    """Back-EMF (V), slope (V/s), next impact (s) after each step of a run; the last row twice."""
+    """Rows of back-EMF, slope and next impact as the circuit of a coupled run got them after each
+    step; the last row is doubled."""
     with closing(Mechanics(scene)) as mechanics:
         lead = Lead(scene, command(scene), Recorder(scene, mechanics, lambda _: None))
         listener = _Listener(lead.state)
@@ -86,7 +87,7 @@ def _replay(scene: Scene) -> Array:
 
 
 class _Listener:
-    """Records the values that the method step-locked gives to the circuit."""
+    """Records what the method step-locked gives the circuit at each macro point."""
 
     def __init__(self, state: Structure) -> None:
         self._state = state

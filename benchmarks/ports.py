@@ -14,7 +14,7 @@ PANELS = {
     "relay": (("relay.current", 1e3, "coil [mA]"), ("relay.gap", 1e3, "gap [mm]")),
     "closed-grip": (("rig.z_part", 1e3, "part [mm]"), ("jaw.normal_force", 1.0, "jaw [N]")),
 }
-"""For each scene two waveforms: name, factor, and label of the axis."""
+"""Two waveforms of each scene: name, factor to the shown unit, and label of the axis."""
 
 
 def main() -> None:

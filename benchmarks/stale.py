@@ -19,7 +19,7 @@ CORE = (
     "cosim/simulation",
     "cosim/stepper",
 )
-"""Folders of sources on which every simulated number depends."""
+"""Folders of the sources on which every simulated number depends."""
 SOURCES = {".c", ".h", ".def", ".cir", ".lib", ".py", ".toml"}
 MADE = Path("benchmarks/made.json")
 
@@ -35,14 +35,14 @@ def core(root: Path = ROOT) -> str:
 
 
 def made(files: list[str], root: Path = ROOT) -> None:
-    """Note that these files are made with the present core."""
+    """Record that ``files`` were made with the present core."""
     known = _known(root) | dict.fromkeys((Path(file).name for file in files), core(root))
-    there = {name: known[name] for name in sorted(known) if (root / "results" / name).exists()}
-    (root / MADE).write_text(json.dumps(there, indent=1) + "\n", encoding="utf-8")
+    kept = {name: known[name] for name in sorted(known) if (root / "results" / name).exists()}
+    (root / MADE).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
 
 
 def stale(root: Path = ROOT) -> dict[str, list[str]]:
-    """The files that were made with another core, by its digest; "" for an unknown core."""
+    """The files made with another core, by that core's digest; ``""`` if it is not known."""
     found: dict[str, list[str]] = defaultdict(list)
     known, now = _known(root), core(root)
     for path in sorted((root / "results").iterdir()):

@@ -157,7 +157,6 @@ def both_sides(
 
 
 def _slipping(signals: Signals) -> float | None:
-    """The share of the rows in which part and surface differ by more than STICKS."""
     apart = np.abs(signals["v_part"] - signals["v_surface"])
     known = apart[np.isfinite(apart)]
     return float(np.mean(known > STICKS)) if len(known) else None
