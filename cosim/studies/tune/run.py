@@ -187,7 +187,7 @@ def family(name: str) -> tuple[dict[str, Any], dict[str, tuple[float, float]]]:
         levels = {f"drive.table.{k + 1}": (-0.5, 0.5) for k in range(len(phases))}
         return sharp | {"drive.table": [[phase, 0.5 - phase] for phase in phases]}, levels
     if name not in COMMANDS or name in TABLES:
-        alone = ", ".join(shape for shape in COMMANDS if shape not in TABLES)
+        alone = ", ".join(each for each in COMMANDS if each not in TABLES)
         raise BadInput(
             f"--waveform {plain(name)}: must be one of {alone}, steps:N and pieces:N with N from "
             f"2 to {MOST_CORNERS}."
