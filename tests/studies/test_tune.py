@@ -238,7 +238,8 @@ def test_a_waveform_without_a_setting_costs_only_itself(tmp_path: Path) -> None:
     """Square waves of these volts make more heat than may be."""
     few = {**FAST, "run.settle": 0.05, "run.duration": 0.1}
     given: dict[str, Any] = {"heat": 3.0, "budget": 24, "workers": 1, "out": tmp_path}
-    for name in ("best-square.toml", "best-mine.toml"):  # of an earlier search, and the user's
+    old = ("best-square.toml", "best-falling-sawtooth.toml", "best-steps-6.toml")
+    for name in (*old, "best-mine.toml"):  # of an earlier search, and the user's
         (tmp_path / name).touch()
     over = {"drive.offset": (-1.0, 1.0)}
     with pytest.warns(Note, match="square: No setting could be run"):

@@ -1,6 +1,7 @@
 """The result of a search: every run, the best settings, and a sentence on their robustness."""
 
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, isfinite
@@ -23,6 +24,8 @@ from cosim.waveforms.quantities import bench_unit, label, meaning, percent, with
 from cosim.waveforms.report import motion_in_words
 
 COLORS = ("#1f6fb2", "#d1495b", "#2a9d8f", "#e9a03b", "#8d99ae", "#6a4c93")
+_OF_WAVEFORM = re.compile(rf"best-({'|'.join(COMMANDS)})(-\d+)?")
+"""The names of files with the best of other waveforms, such as ``best-steps-6``."""
 MOST_KEYS = 4
 """The figure shows the settings of at most so many keys."""
 
@@ -213,7 +216,7 @@ class Tuning:
         found = {"name": f"{self.scene.name}-tuned"[:64], "description": f"Tuned for the {aim}"}
         write_json(out / "tune.json", numbers)
         for path in out.glob("best-*.toml"):
-            if path.stem.split("-")[1] in COMMANDS:  # of an earlier search
+            if _OF_WAVEFORM.fullmatch(path.stem):  # of an earlier search
                 path.unlink()
         for each in (self, *self.others):
             name = "best" if each is self else f"best-{each.waveform.replace(':', '-')}"
