@@ -15,9 +15,9 @@ from cosim.circuit.lint.words import definitions, split_assignments, words
 GROUND = "0"
 
 NODES = dict.fromkeys("rclvibefgh", 2) | {"d": 2, "s": 4, "w": 2, "t": 4, "o": 4, "k": 0}
-"""Nodes right after the name, where their number is fixed (controlling nodes apart)."""
+"""Number of nodes right after the name, where it is fixed (E and G without controlling nodes)."""
 MODEL_PLACES = {"d": (2, 3), "q": (3, 5), "m": (3, 7), "j": (3, 4), "z": (3, 3)}
-"""The least and the most nodes before the model's name."""
+"""The smallest and the largest number of nodes before the model's name."""
 MODEL_TYPES = {
     "r": {"r", "res"},
     "c": {"c"},
@@ -37,7 +37,7 @@ _SPECIAL = {"poly", "table", "laplace", "freq", "value", "vol", "cur", "and", "n
 """First words of controlled sources that have no controlling nodes."""
 
 _FLAG = re.compile("=|^(?:off|thermal)$")
-"""In a word behind the model that is no bare area: ngspice 39 crashes on one, or drops it."""
+"""What a word behind the model has. ngspice 39 crashes on a bare number there, or drops it."""
 
 
 @dataclass
@@ -51,7 +51,7 @@ class Element:
     conditional: bool
     model: str | None = None
     controls: list[str] = field(default_factory=list)
-    """Nodes that it only senses."""
+    """Nodes whose voltage controls the element; no current flows into them."""
 
     @property
     def kind(self) -> str:
@@ -81,10 +81,10 @@ class Scope:
     lines: list[tuple[Line, Element | None]] = field(default_factory=list)
     globals: set[str] = field(default_factory=set)
     order: list[tuple[Line, Element | None, "Scope"]] = field(default_factory=list)
-    """Of the top level: all lines as they stand, each with its element and its scope."""
+    """At the top level: all lines in the file's order, each with its element and its scope."""
     used: bool = False
     free: set[str] = field(default_factory=set)
-    """Of a subcircuit: parameters that its calls set and only its body names."""
+    """Parameters of a subcircuit that its calls set and its body uses, but no line declares."""
 
     def chain(self) -> "Iterator[Scope]":
         scope: Scope | None = self
@@ -100,7 +100,7 @@ class Scope:
         return next((s.subcircuits[name] for s in self.chain() if name in s.subcircuits), None)
 
     def in_use(self) -> "Iterator[Scope]":
-        """The scope and the subcircuits within that are called; ngspice drops the others unread."""
+        """The scope and the called subcircuits within; ngspice drops the others unread."""
         if self.used:
             yield self
         for alternatives in self.subcircuits.values():
@@ -149,7 +149,7 @@ class _Parser:
             holder.names.add(element.name)
         elif handler := handlers.get(re.findall(r"\.\w*", line.text)[0].lower()):
             handler(line, found)
-            if self.scope.parent is holder:  # the line begins it
+            if self.scope.parent is holder:  # a .subckt line belongs to the scope that it opens
                 holder = self.scope
         holder.lines.append((line, element))
         self.top.order.append((line, element, holder))
@@ -205,6 +205,7 @@ class _Parser:
         self.scope.model_lines[found[1]] = line
 
     def _place_nodes(self) -> None:
+        """Split the elements of called subcircuits into nodes and words, and find ``free``."""
         calls: list[tuple[Element, set[str], Scope]] = []
         waiting = [self.top]
         while waiting:
@@ -245,7 +246,7 @@ def _check_brackets(line: Line) -> None:
 
 
 def _place(element: Element, scope: Scope) -> None:
-    """Tell nodes from what follows them."""
+    """Split an element's words into nodes, model and the rest."""
     kind = element.kind
     if kind == "x":
         positional, assigned = split_assignments(element.words)
@@ -261,7 +262,7 @@ def _place(element: Element, scope: Scope) -> None:
         known = (i for i in places if scope.model_types(element.words[i]) is not None)
         place = next(known, None)
         if place is None:
-            # Words before a "key=" are as likely nodes as models.
+            # Which word was to be the model is a guess, for the message alone.
             name = element.words[least + 1 if kind == "m" and len(element.words) > 4 else least]
             element.refuse(f": no model {shown(name)} is defined here{COPY}")
         _split(element, place)
@@ -288,7 +289,7 @@ def _split(element: Element, count: int) -> None:
 
 
 def _place_controls(element: Element) -> None:
-    """Tell the controlling nodes of a linear voltage-controlled source."""
+    """Split off the controlling nodes of a linear voltage-controlled source."""
     first = element.words[0] if element.words else ""
     if not re.fullmatch(r"[^={}']+", first) or first in _SPECIAL:
         return

@@ -28,10 +28,11 @@ PARAMETRIC = _COMMON | dict.fromkeys(word_set("arctan int sqr"), 1)
 """Functions of ngspice 39's parameters, which are numbers before a run, and how many arguments each
 takes: with too many or too few ngspice calculates something else in silence."""
 BEHAVIOURAL = _COMMON | dict.fromkeys(word_set("ddt eq0 ge0 gt0 le0 lt0 ne0 u u2 uramp"), 1)
-"""Those of its behavioural sources, except ``pwl``, which takes any number of points. ngspice
-replaces the random ones by a number as it reads the netlist."""
+"""Functions of ngspice's behavioural sources, except ``pwl``, which takes any number of points.
+Random functions are replaced by a number when ngspice reads the netlist."""
 MOST_CALLS, DEEPEST = 10_000, 100
-"""Calls within functions, all told and one in another: ngspice 39 writes so many out in 0.15 s."""
+"""Limits of the calls that one call expands to, and of their nesting: ngspice 39 expands so many in
+0.15 s."""
 CONSTANTS = word_set("time temper hertz")
 BEHAVIOURAL_CONSTANTS = word_set("pi e i s")
 
@@ -41,10 +42,13 @@ _MEMORY = (
     "instead of in a .func"
 )
 _VARYING = re.compile(r"\b(?:[vi]\s*\(|(?:time|temper|hertz)\b)", re.IGNORECASE)
+# A single number or name, perhaps signed, perhaps in braces.
 _PLAIN = re.compile(r"\s*\{?\s*[+-]?\s*[\w.]+(?:(?<=\de)[+-]?\d+)?\s*\}?\s*", re.IGNORECASE)
+# The same with parentheses around it; of braces nothing but blanks is left by ``unbraced``.
 _POINT = re.compile(
     r"(?:[\s(+-]*(?:\{ *\}|[\d.]\w*(?:\.\w*)?(?:(?<=\de)[+-]\d+)?)|[\s(]*[a-z_]\w*)[\s)]*", re.I
 )
+# KEY=NAME, without a call.
 _ASSIGNMENT = re.compile(r"([a-z_]\w*)=([a-z_]\w*)\b(?!\s*\()", re.IGNORECASE)
 _DROPPABLE = re.compile(r"\.model ([^\s(]+)|\.func (\w+)")
 _CALLED = re.compile(r"(\w+)\s*\(")
@@ -57,7 +61,7 @@ _PIECE = re.compile(
     re.IGNORECASE | re.VERBOSE,
 )
 _BROKEN = re.compile(r"(?:^|[bjp])(?:[ej]|$)|[oe][ob]")
-"""Of the first letters of the pieces: an operand lacks, or an operator."""
+"""In the first letters of the groups of _PIECE: a missing operand, or a missing operator."""
 _NAME = re.compile(r"[a-z_][\w.$#]*")
 _KEY = re.compile(r"\s*=(?!=)")
 _BODY = re.compile(r"\b[vi]\s*=(?!=)", re.IGNORECASE)
@@ -77,7 +81,8 @@ class _Function:
 
 
 class Names:
-    """What may be used where: ngspice also looks up the parameters of a subcircuit's callers."""
+    """The parameters and functions that each scope may use, by the scope's ``id``: its own, those
+    of enclosing scopes, and, as ngspice looks them up too, those of a subcircuit's callers."""
 
     def __init__(self, top: Scope) -> None:
         self.parameters: dict[int, set[str]] = {}
@@ -89,15 +94,15 @@ class Names:
             self.functions[id(scope)] = set().union(*(s.functions for s in chain))
         lines = [line.text.lower() for s in scopes for line, _ in s.lines]
         self.definitions: dict[str, list[_Function]] = {}
-        """Of the user's functions, whatever their scope."""
+        """The user's functions by name, whatever their scope."""
         for scope in scopes:
             for line, _ in scope.lines:
                 for function in _functions(line):
                     self.definitions.setdefault(function.name, []).append(function)
         self.checked: set[tuple[str, bool | None]] = set()
-        """Names of these whose bodies have been looked at, and for which parser."""
+        """Names of functions whose bodies have been checked, with ``behavioural``."""
         self.calls: dict[str, int] = {}
-        """How many calls one of each becomes when ngspice writes them out."""
+        """By a function's name: how many calls ngspice makes of one when it expands it."""
         self.mentioned = {word for s in scopes for e in s.elements for word in [e.model, *e.words]}
         calls = (text.partition(")")[2] if text.startswith(".func") else text for text in lines)
         self.called = {name for text in calls for name in _CALLED.findall(text)}
@@ -106,7 +111,7 @@ class Names:
             growing = sum(self._inherit(scope) for scope in scopes) > 0
 
     def only(self, name: str) -> _Function | None:
-        """The function of this name, if there is but one."""
+        """The function of this name, if there is exactly one."""
         found = self.definitions.get(name, [])
         return found[0] if len(found) == 1 else None
 
@@ -134,9 +139,10 @@ class Names:
     def check_own(
         self, line: Line, name: str, arguments: list[str], behavioural: bool | None, depth: int = 0
     ) -> None:
-        """Check a call of the netlist's own function, once also the calls in its body."""
+        """Check a call of the netlist's own function, and, the first time, the calls in its body.
+        ``behavioural`` names the parser: of B sources, of parameters, or None for either."""
         function = self.only(name)
-        if function is None:  # which one is meant is not known
+        if function is None:  # several have this name
             return
         if len(arguments) != len(function.formals):
             wanted = _counted(len(function.formals))
@@ -152,7 +158,7 @@ class Names:
                 self.check_own(function.line, inner, given, behavioural, depth + 1)
             elif reason := _misused(inner, given, behavioural):
                 refuse(function.line, reason)
-        # Those that it calls are counted by now; one that calls itself is not.
+        # The functions that it calls are counted by now, but for itself, if it is recursive.
         self.calls[name] = 1 + sum(self.calls.get(inner, 0) for inner, _ in calls)
         if self.calls[name] > MOST_CALLS:
             within = [inner for inner in dict(calls) if self.calls.get(inner, 0) > 1]
@@ -193,7 +199,7 @@ def check_names(scope: Scope, names: Names) -> None:
 
 
 def _check_operators(line: Line, expression: str) -> None:
-    """What ngspice cannot read, or reads as something else in silence."""
+    """Refuse commas outside calls, and ? without :, which ngspice misreads."""
     calls: list[bool] = []
     counts = {"?": 0, ":": 0}
     for piece in _PIECE.finditer(expression):
@@ -221,12 +227,13 @@ def _misused(name: str, arguments: list[str], behavioural: bool | None) -> str |
     count = len(arguments)
     if name in ("pwl", "table") and behavioural:
         if count >= 5 and count % 2:
-            if not all(_POINT.fullmatch(unbraced(x)) and not _varies(x) for x in arguments[1:]):
+            given = arguments[1:]
+            if not all(_POINT.fullmatch(unbraced(each)) and not _varies(each) for each in given):
                 return f"the points of {name}() must be plain numbers, or expressions in braces"
             points = [number(argument.strip()) for argument in arguments[1::2]]
-            for one, other in pairwise(points):
-                if one is not None and other is not None and one >= other:
-                    return f"the x values of {name}() must rise, {other:g} comes after {one:g}"
+            for last, x in pairwise(points):
+                if last is not None and x is not None and last >= x:
+                    return f"the x values of {name}() must rise, {x:g} comes after {last:g}"
             return None
         return f"{name}() takes a value and at least two points, each of two numbers"
     if name == "limit" and count != 2:
@@ -292,7 +299,8 @@ def check_circles(top: Scope, names: Names) -> None:
 
 
 def used(expression: str) -> Iterator[tuple[str, list[str] | None]]:
-    """The names in an expression but for nodes and sources, with their arguments if called."""
+    """The names in an expression except nodes and sources: with their arguments if called, else
+    with None."""
     text, place = expression.lower(), 0
     while piece := _PIECE.search(text, place):
         name, place = piece[0].rstrip("( \t"), piece.end()
@@ -375,5 +383,5 @@ def _formals(text: str) -> tuple[str, ...]:
 
 
 def unbraced(text: str) -> str:
-    """The text with what is in braces or quotes blanked out, place by place."""
+    """The text with the content of braces and quotes replaced by as many blanks."""
     return re.sub(r"\{[^{}]*\}|'[^']*'", lambda match: f"{{{' ' * (len(match[0]) - 2)}}}", text)
