@@ -19,17 +19,17 @@ from cosim.files.resources import circuits
 from cosim.scene import Scene
 
 REQUIRED = ("i(vemf)", "v(out)", "v(sense)")
-"""What every netlist has: the coils' total current, and the two ends of the coil."""
+"""Vectors that every netlist has: the coils' total current, and the voltages of the coil's ends."""
 OPTIONAL = ("v1", "swing", "climit", "slewing")
 """Nodes that are read where a netlist has them: the command at the power amplifier's input, and one
 for each limit, which acts while the node's magnitude is at least 0.5 V."""
 
 MOTIONAL = "v(motional)"
-"""With the method "companion": the part of the back-EMF that the circuit itself integrates."""
+"""With the method "companion": the part of the back-EMF that the circuit itself integrates, V."""
 
 LEAK_TIME = 0.1
-"""s; time constant with which that part decays. It stays small over a long run, so that ngspice's
-relative tolerance stays a tolerance on the back-EMF."""
+"""s; time constant with which MOTIONAL decays. So it stays small over a long run, and ngspice's
+relative tolerance remains one on the back-EMF."""
 
 
 _CIRCUIT_PARAMETERS = (
@@ -69,7 +69,7 @@ def prepare(scene: Scene) -> tuple[str, dict[str, str]]:
     path, words = path_of(scene), _words(scene)
     if scene.circuit.netlist is None:
         (title, top), every, own = _packaged(path), [*dict.fromkeys(words.values())], None
-    else:  # may have changed since it was read last
+    else:  # read anew each time, as the file may have changed
         title, top, every, own = _checked(path, scene.renamed, tuple(words.values()))
         words |= {each: each for each in every if each not in words}
     elements = top.elements
@@ -96,7 +96,8 @@ def prepare(scene: Scene) -> tuple[str, dict[str, str]]:
 
 
 def _words(scene: Scene) -> dict[str, str]:
-    """What is read of a netlist of one's own under other names, or besides, by the log's names."""
+    """By the log's names: the words that a user's netlist has for the machine's current and ends,
+    and those to be saved besides."""
     ends = {"machine.current": "i(vemf)", "machine.out": "v(out)", "machine.sense": "v(sense)"}
     named = {ends[end]: name for end, name in scene.renamed.items() if end in ends}
     return named | {name: name for name in scene.circuit.save or ()}
@@ -118,7 +119,7 @@ def _packaged(path: Path) -> tuple[Line, Scope]:
 
 
 def asked_for(scene: Scene) -> tuple[list[Measure], list[str]]:
-    """What a netlist of one's own measures, in words that the log has, and a sentence for each of
+    """The measurements of a user's netlist, whose words are in the log, and a sentence for each of
     its lines that has no effect."""
     _, dropped = read(path_of(scene))
     return measures(dropped), [*without_effect(dropped)]
@@ -129,7 +130,7 @@ _SOURCES = ("machine.back_emf", "drive")
 
 
 def _external_sources(elements: Sequence[Element], renamed: Mapping[str, str]) -> dict[Line, str]:
-    """The lines of the agreed sources, or of those that ports join, as external ones."""
+    """External sources in place of the agreed ones, or of those that ports join; by their lines."""
     present = {element.name for element in elements}
     agreed: Sequence[str] = [renamed[end].lower() for end in _SOURCES] if renamed else ()
     agreed = agreed or next(names for names in AGREED if present >= set(names))
@@ -143,8 +144,8 @@ def _external_sources(elements: Sequence[Element], renamed: Mapping[str, str]) -
 def _carry_inertia(external: dict[Line, str], title: Line, present: set[str], emf: str) -> None:
     """Put the mechanics' local inertia in series with the coil, for the method "companion".
 
-    A mass m behind the coil acts as a capacitor C = m/Bl² with e = ∫ i dt/C. Stick, slip and
-    contact change m: the netlist has 1 F, charged by the current times 1/C of an external source.
+    A mass m behind the coil acts as a capacitor C = m/Bl² with e = ∫ i dt/C. As stick, slip and
+    contact change m, the netlist has 1 F, charged by the current times the gain 1/C of ``Vgain``.
     """
     for node in ("motional", "motional_gain", "motional_emf"):
         if node in present:
@@ -164,5 +165,5 @@ def _carry_inertia(external: dict[Line, str], title: Line, present: set[str], em
 
 
 AT_WORK, AT_WORK_HERE = 0.5, 1e-3
-"""V: from which magnitude on the nodes ``swing`` and ``climit`` tell that a limit acts, in a user's
-netlist and in those of ``circuits/``, where they are 0 else."""
+"""V: a limit acts while its node, ``swing`` or ``climit``, has at least this magnitude; in a user's
+netlist, and in those of ``circuits/``, where the node is exactly 0 otherwise."""

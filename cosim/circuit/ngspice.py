@@ -1,13 +1,14 @@
 """ngspice, led through PySpice: the library, its callbacks, and one run.
 
 Order of calls within a transient run (ngspice 39): for each attempted step ``GetVSRCData`` at every
-Newton iteration and then ``GetSyncData`` at location 1; for an accepted one ``SendData`` and then
-``GetSyncData`` at location 0, where the next step may be shortened. No such call follows the last.
+Newton iteration and then ``GetSyncData`` at location 1; for an accepted step ``SendData`` and then
+``GetSyncData`` at location 0, where the next step may be shortened. After the last step the call at
+location 0 is missing.
 
-The library reads the .spiceinit of its home and of the working folder, and the spinit of the folder
-that a variable names: a worker has an empty folder for all of them.
+The library reads .spiceinit from the home and the working folder, and spinit from the folder that
+SPICE_SCRIPTS names: for a worker all three are an empty folder.
 
-Importing this module loads PySpice, which takes a while: only workers do.
+Importing this module loads PySpice, which is slow: only workers import it.
 """
 
 import logging
@@ -27,7 +28,7 @@ from cosim.toolchain.processes import retire
 
 _ffi: Any = Shared.ffi
 
-# It warns of versions newer than itself, and of words on stderr that are no errors.
+# PySpice warns of newer versions of ngspice, and of words on stderr that are no errors.
 logging.getLogger(Shared.__name__).setLevel(logging.CRITICAL)
 
 
@@ -37,51 +38,52 @@ _TROUBLE = re.compile(
 )
 _NOISE = re.compile(
     r"^Note|init|ngspice.dll|circuits? loaded|is ignored|No compatibility|@\w+\[pulse\]|"
-    "no such device or model name",  # which was asked for its edges
+    "no such device or model name",  # answers ``ask`` for the edges of a source
     re.IGNORECASE,
 )
-"""What it says of itself, and what only follows from an earlier word."""
+"""Output of ngspice that tells no reason: on itself, or a consequence of an earlier message."""
 
 
 _SINGULAR = re.compile(r"singular matrix: check (nodes? \S+(?: and \S+)?)", re.IGNORECASE)
 
 LOOSER = "abstol=1e-8 vntol=1e-5 chgtol=1e-11"
-"""A, V, C. ngspice's own 1 pA, 1 uV and 10 fC are made for integrated circuits: where amperes are
-switched, no step is small enough for them."""
+"""A, V, C. ngspice's defaults 1 pA, 1 uV and 10 fC are meant for integrated circuits: where amperes
+are switched, no step is small enough for them."""
 
 
 class Leader(Protocol):
-    """What the compiled callbacks act for, during a run."""
+    """A run, for which the compiled callbacks act."""
 
     places: Any
-    """ctypes array, to be filled: where the saved vectors are among those sent; then the time."""
+    """ctypes array, to be filled: the indices of the saved vectors, and last of the time, among
+    the vectors that ngspice sends."""
 
     def begin(self) -> None:
         """The callbacks act for this run from now on."""
 
     def finish(self) -> None:
-        """No further step comes; the last one was not told of."""
+        """The run has ended; the callbacks were not told of the end of the last step."""
 
     def loaded(self, engine: "Engine") -> None:
-        """The circuit is there, its run not yet begun."""
+        """The circuit is loaded, its run not yet begun."""
 
     def stop(self) -> None:
-        """Nothing is to be done any more: the sources become NaN, so that no step succeeds."""
+        """Make the run fail: the sources become NaN, so that no step succeeds."""
 
 
 @cache
 def engine(data: int, source: int, step: int) -> "Engine":
     """The process's one ngspice, which calls compiled functions at these addresses: SendData,
-    GetVSRCData, GetSyncData. Python would take longer than ngspice itself. Raises BadInput where
-    the library is missing.
+    GetVSRCData, GetSyncData; in Python these would take longer than ngspice itself. Raises BadInput
+    where the library is missing.
 
-    It loads no code models: ``lint/dialect.py`` writes what would need them otherwise, and each
-    step looks at all kinds of elements, so they would cost 5 % of a run.
+    It loads no code models: ``lint/dialect.py`` does without them, and they would cost 5 % of each
+    run, since every step visits all kinds of elements.
     """
     name = ngspice_library()
-    os.environ["SPICE_SCRIPTS"] = os.curdir  # not its own start-up file, which loads code models
+    os.environ["SPICE_SCRIPTS"] = os.curdir  # not the installed spinit, which loads code models
     try:
-        if os.sep in name and not os.path.isfile(name):  # to open a pipe would wait for ever
+        if os.sep in name and not os.path.isfile(name):  # opening a pipe would wait for ever
             raise OSError("there is no such file")
         return Engine(name, data, source, step)
     except (OSError, AttributeError) as error:  # the latter where it lacks ngspice's functions
@@ -93,13 +95,13 @@ def engine(data: int, source: int, step: int) -> "Engine":
 
 
 class Engine(Shared.NgSpiceShared):
-    """One ngspice library, with compiled callbacks: PySpice's make an object of every value."""
+    """The ngspice library with compiled callbacks: PySpice's create an object for every value."""
 
     sent: tuple[str, ...] = ()
-    """The names of all vectors of the run, as they are sent."""
+    """The names of all vectors of the run, in the order in which ngspice sends them."""
     _looser = False
     poisoned = False
-    """ngspice has given up for good: nothing runs in this process's library any more."""
+    """ngspice has asked to exit: its library in this process can run nothing any more."""
 
     def __init__(self, library: str, data: int, source: int, step: int) -> None:
         self.LIBRARY_PATH = library
@@ -109,10 +111,10 @@ class Engine(Shared.NgSpiceShared):
         self._data = data
         super().__init__(ngspice_id=0, send_data=True)
         self._library: Any = self._ngspice_shared
-        # PySpice leaves GetSyncData out; a second call puts it in, and a faster GetVSRCData.
+        # PySpice sets no GetSyncData; this second call sets it, and a compiled GetVSRCData.
         self._library.ngSpice_Init_Sync(
             _ffi.cast("GetVSRCData *", source),
-            _ffi.cast("GetISRCData *", source),  # which has the same arguments
+            _ffi.cast("GetISRCData *", source),  # its arguments are those of GetVSRCData
             _ffi.cast("GetSyncData *", step),
             _ffi.NULL,
             self._self_c,
@@ -120,12 +122,12 @@ class Engine(Shared.NgSpiceShared):
 
     @property
     def _send_data_c(self) -> Any:
-        """What PySpice gives to ngspice for SendData when the library starts, and never again."""
+        """The SendData that PySpice hands to ngspice, once, when the library starts."""
         return _ffi.cast("SendData *", self._data)
 
     @_send_data_c.setter
     def _send_data_c(self, plain: Any) -> None:
-        """PySpice sets its own."""
+        """Ignore PySpice's own callback."""
 
     def transient(self, deck: str, save: tuple[str, ...], leader: Leader) -> None:
         """Run the transient analysis of ``deck``; ``save`` are its saved vectors, in this order.
@@ -143,8 +145,8 @@ class Engine(Shared.NgSpiceShared):
     def _run(self, deck: str) -> None:
         self.clear_output()
         try:
-            # Not PySpice's load_circuit and run: they take any word on stderr, and any node
-            # with "error" in its name, for a failure. What fails is known by what is missing.
+            # Not PySpice's load_circuit and run: they take any word on stderr, and any node with
+            # "error" in its name, for a failure. Here a run has failed if its end is missing.
             self._load(deck)
             if not self.poisoned:
                 if self._leader is not None:
@@ -165,11 +167,11 @@ class Engine(Shared.NgSpiceShared):
         self._library.ngSpice_Circ(_ffi.new("char *[]", [*lines, _ffi.NULL]))
 
     def address(self, function: str) -> int:
-        """Where compiled code finds one of the library's functions."""
+        """The address of one of the library's functions, for compiled code."""
         return int(_ffi.cast("uintptr_t", getattr(self._library, function)))
 
     def ask(self, device: str) -> list[float]:
-        """The values of a device's parameter, ``@v1[pulse]``; none where it has no such one."""
+        """The values of a device's parameter such as ``@v1[pulse]``; none where it is missing."""
         found = self._library.ngGet_Vec_Info(device.encode())
         values: list[float] = []
         if found != _ffi.NULL and found.v_realdata != _ffi.NULL:
@@ -178,7 +180,7 @@ class Engine(Shared.NgSpiceShared):
         return values
 
     def said(self) -> str:
-        """ngspice's own words of trouble, as the end of a message."""
+        """ngspice's messages of trouble in the last run, as the end of a sentence."""
         words = [" ".join(word.split()) for word in (*self._stderr, *self._stdout)]
         if match := next(filter(None, map(_SINGULAR.search, words)), None):
             return (
@@ -190,7 +192,7 @@ class Engine(Shared.NgSpiceShared):
 
     @property
     def too_small(self) -> bool:
-        """It ended its last run since no step was small enough for its tolerances."""
+        """Whether the last run ended because no step was small enough for the tolerances."""
         return any("imestep too small" in word for word in (*self._stderr, *self._stdout))
 
     @contextmanager
@@ -203,12 +205,12 @@ class Engine(Shared.NgSpiceShared):
             self._looser = False
 
     def ignored(self) -> list[str]:
-        """The models' parameters that it does not know."""
+        """Parameters of models that ngspice does not know, from its messages."""
         said = "\n".join((*self._stderr, *self._stdout))
         return [*dict.fromkeys(re.findall(r"unrecognized parameter \((\w+)\)", said))]
 
     def fail(self, failure: BaseException) -> None:
-        """Make ngspice give up; ``run`` raises ``failure`` then. An exception cannot pass C."""
+        """Make ngspice give up; :meth:`transient` then raises ``failure``, which cannot pass C."""
         if self._failure is None:
             self._failure = failure
         if self._leader is not None:

@@ -1,7 +1,7 @@
-"""What a netlist asks for besides its circuit: ``.meas`` is computed, the rest has no effect.
+"""A netlist's output lines: ``.meas`` is computed, all others have no effect.
 
-A measurement is computed on what ngspice recorded. All that it compares or averages is a vector or
-an expression of ngspice's, so a limit in braces is one too, constant in time.
+A measurement is computed from recorded vectors. Each operand is a number, or a vector or expression
+that ngspice records over time; even a constant limit in braces.
 """
 
 import ast
@@ -25,8 +25,8 @@ _ANALYSES = word_set(".op .ac .dc .tf .noise .disto .pz .sens .sp .four .fourier
 _REDUCED = word_set("avg rms min max pp integ")
 _MEAS = re.compile(r"\.meas\w*\s+(?:(tran|ac|dc|op|tf|noise|sp)\s+)?(\w+)\s+(\w+)\b(.*)", re.DOTALL)
 _CLAUSE = re.compile(r"(?<![^\s,)}'])(from|to|at|val|td|cross|rise|fall|when|trig|targ)\b\s*=?\s*")
-_BRACKETS = re.compile(r"\([^()]*\)|\{[^{}]*\}")
-_LONGEST = 2_000
+_BRACKETS = re.compile(r"\([^()]*\)|\{[^{}]*\}")  # innermost ones
+_LONGEST = 2_000  # characters of a .meas line
 _FORMS = (
     "it may be AVG, RMS, MIN, MAX, PP or INTEG of an expression with FROM= and TO=, FIND with AT= "
     "or WHEN, WHEN, TRIG and TARG, of expression=value, TD=, CROSS=, RISE=, FALL=, PARAM of .meas"
@@ -42,7 +42,8 @@ _PIECE = re.compile(rf"{NUMBER.pattern}|[a-z_]\w*|[-+*/^(), ]", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class Event:
-    """A time, s, or when an expression crosses another; the last time if ``which`` is 0."""
+    """A time ``at`` (s), or the ``which``-th crossing, 0 being the last, of ``left`` and ``right``
+    after a ``delay`` (s)."""
 
     at: str = ""
     left: str = ""
@@ -54,7 +55,8 @@ class Event:
 
 @dataclass(frozen=True)
 class Measure:
-    """A ``.meas`` line: ``what`` is done with ``of``, between two events or at the first."""
+    """A ``.meas`` line: the operation ``what`` on the expression ``of``, between two events or at
+    one."""
 
     line: Line
     name: str
@@ -97,7 +99,7 @@ def without_effect(dropped: Sequence[Line]) -> Iterator[str]:
 
 
 def measures(dropped: Sequence[Line]) -> list[Measure]:
-    """The measurements of the transient analysis. Raises BadInput for what is none."""
+    """The measurements of the transient analysis. Raises BadInput for a .meas line that is none."""
     found: dict[str, Measure] = {}
     for line in dropped:
         match = _MEAS.match(line.text.lower()) if len(line.text) < _LONGEST else None
@@ -131,28 +133,28 @@ def _measure(line: Line, name: str, what: str, rest: str) -> Measure:
 
 
 def _computed(line: Line, text: str) -> str:
-    """An expression of numbers, names and what joins them, as Python spells it."""
+    """An expression of numbers, names and operators, in Python's syntax. Raises BadInput."""
     pieces = [match[0] for match in _PIECE.finditer(text)]
     plain = [repr(number(each)) if each[0] in ".0123456789" else each for each in pieces]
     found = "".join(plain).replace("^", "**")
     with suppress(SyntaxError, TypeError, RecursionError, MemoryError):
         if "".join(pieces) == text:
-            with suppress(ArithmeticError, ValueError):  # which the values are to tell
+            with suppress(ArithmeticError, ValueError):  # these depend on the values of the names
                 _value_of(ast.parse(found, mode="eval").body, defaultdict(lambda: math.nan))
             return found
     refuse(line, f"{shown(text)} is no expression of numbers and names")
 
 
 def _value_of(node: ast.AST, names: Mapping[str, float]) -> float:
-    """The value of an expression: nothing but what stands here is ever computed. Raises TypeError
-    for all else, ArithmeticError, ValueError and KeyError."""
+    """The value of an expression of the nodes listed here. Raises TypeError for any other node, and
+    ArithmeticError, ValueError or KeyError for values and names."""
     match node:
         case ast.Constant(value=float(value)):
             return value
         case ast.Name(id=name) if name not in _CALLS:
             return names[name]
-        case ast.UnaryOp(op=op, operand=one) if type(op) in _OPERATIONS:
-            return _OPERATIONS[type(op)](_value_of(one, names))
+        case ast.UnaryOp(op=op, operand=operand) if type(op) in _OPERATIONS:
+            return _OPERATIONS[type(op)](_value_of(operand, names))
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATIONS:
             return _OPERATIONS[type(op)](_value_of(left, names), _value_of(right, names))
         case ast.Call(func=ast.Name(id=name), args=[*given], keywords=[]) if name in _CALLS:
@@ -161,7 +163,8 @@ def _value_of(node: ast.AST, names: Mapping[str, float]) -> float:
 
 
 def _clauses(text: str) -> list[tuple[str, str]]:
-    """What stands before the first keyword, then each keyword with what follows it."""
+    """Pairs of a keyword and the text after it; the first, with "", has the text before them. Text
+    in brackets is masked, so that no keyword is found in it."""
     outside, before = text, ""
     while outside != before:
         before, outside = outside, _BRACKETS.sub(lambda match: "_" * len(match[0]), outside)
@@ -182,7 +185,7 @@ def _plain(text: str) -> str:
 
 
 def _event(clauses: Sequence[tuple[str, str]]) -> Event:
-    """Of the clauses from WHEN, TRIG or TARG on; one of nothing where they are not understood."""
+    """The event of the clauses from WHEN, TRIG or TARG on; an empty one if they are no such."""
     (_, what), *rest = clauses
     given = dict(rest)
     if "at" in given and not what:
@@ -199,8 +202,8 @@ def _event(clauses: Sequence[tuple[str, str]]) -> Event:
 def measured(
     every: Sequence[Measure], time: Array, known: Mapping[str, Array]
 ) -> tuple[dict[str, float], list[str]]:
-    """The measurements by the names of a summary, and a sentence for each whose event does not
-    come. ``known`` are the values of their words at the times (s)."""
+    """The values of the measurements by their names in a summary, and a sentence for each without
+    one. ``known`` are the values of their words at the times (s)."""
     values, notes = {}, []
     for each in sorted(every, key=lambda each: each.what == "param"):
         others = {key.removeprefix("meas."): np.full(1, value) for key, value in values.items()}
@@ -247,7 +250,7 @@ def _value(each: Measure, time: Array, known: Mapping[str, Array]) -> float | No
 
 
 def _reduced(what: str, t: Array, y: Array) -> float:
-    """Of straight lines between the points."""
+    """A reduction of the straight lines between the points, exact for their integral and square."""
     h, a, b, length = np.diff(t), y[:-1], y[1:], t[-1] - t[0]
     whole, squares = (h * (a + b)).sum() / 2.0, (h * (a * a + a * b + b * b)).sum() / 3.0
     found = {"avg": whole / length, "integ": whole, "rms": np.sqrt(squares / length)}
@@ -256,7 +259,7 @@ def _reduced(what: str, t: Array, y: Array) -> float:
 
 
 def _crossing(time: Array, off: Array, delay: float, event: Event) -> float | None:
-    """When ``off`` goes through 0 the right way for the right time, after the delay (s)."""
+    """The time at which ``off`` crosses 0 as the event has it, after the delay (s), or None."""
     rise, fall = (off[:-1] < 0) & (off[1:] >= 0), (off[:-1] > 0) & (off[1:] <= 0)
     k = np.flatnonzero({"rise": rise, "fall": fall, "cross": rise | fall}[event.edge])
     places = time[k] + (time[k + 1] - time[k]) * off[k] / (off[k] - off[k + 1])

@@ -1,8 +1,8 @@
 """``LAPLACE`` of LTspice and PSpice: a ratio of polynomials in s, as a chain of integrators.
 
-With den(s)·z = u and num(s)·z = y the voltages of the chain are z, s·z, s²·z, …, in units that make
-them comparable: of the time T at which the greatest and the least power of the denominator are
-alike, and of the greatest coefficient of the numerator.
+With den(s)·z = u and num(s)·z = y the voltages of the chain are z, s·z, s²·z, …, scaled to similar
+size: time by T, at which the highest and the lowest term of the denominator are equal, and voltages
+by the numerator's greatest coefficient.
 """
 
 import ast
@@ -13,19 +13,21 @@ from itertools import zip_longest
 
 from cosim.circuit.lint.words import NUMBER, closing, number
 
+# Name, two nodes, control (an expression, V=… or two nodes), LAPLACE, law; LTspice's options go.
 _FORM = re.compile(
     r"(\S+)\s+([^\s(),=]+)\s+([^\s(),=]+)\s+((?:\S.*?)?)\s*\blaplace\b\s*=?\s*(.+?)"
     r"(?:\s+(?:window|nfft|mtol)\s*=.*)?",
     re.IGNORECASE,
 )
 _OPERAND = re.compile(rf"(?:{NUMBER.pattern})|(?!s\b)[a-z_]\w*", re.IGNORECASE)
-_MOST_POWER, _LONGEST = 10, 1_000
-_One = list[str]  # coefficients from that of 1 on, "0" where there is none
+_MOST_POWER, _LONGEST = 10, 1_000  # of s; characters of a coefficient
+_One = list[str]  # a polynomial's coefficients, the constant one first; exactly "0" for none
 _Ratio = tuple[_One, _One]
 
 
 def without_laplace(text: str) -> Iterator[str]:
-    """The source behind its filter; as it stands if it has none that can be read."""
+    """The lines of a filter and then of the source that it feeds; the text as it is if it has no
+    LAPLACE that can be read."""
     match = _FORM.fullmatch(text.strip())
     name, plus, minus, control, law = match.groups() if match else ("", "", "", "", "")
     kind, u = "v" if name[:1] in "eE" else "i", ""
@@ -55,7 +57,7 @@ def without_laplace(text: str) -> Iterator[str]:
         if each != "0"
     )
     yield f"b{x[most]} {x[most]} 0 v={{({unit}*{t}**{most}/({den[most]}))}}*({u}){held}"
-    for power in range(most):  # what integrates without end begins at 0
+    for power in range(most):  # integrators below the lowest term have no rest point: held at 0
         still = f"time > 0 ? v({x[power + 1]}) : -1e9*v({x[power]})"
         yield f"b{x[power]} 0 {x[power]} i={still if power < least else f'v({x[power + 1]})'}"
         yield f"c{x[power]} {x[power]} 0 {{{t}}}"
@@ -64,7 +66,8 @@ def without_laplace(text: str) -> Iterator[str]:
 
 
 def _ratio(law: str) -> _Ratio | None:
-    """Numerator and denominator, without powers of s that are in both."""
+    """Numerator and denominator without common powers of s; None if the law is no proper ratio.
+    Python parses it, with the numbers and names but s replaced by ``_0``, ``_1``, …"""
     found: list[str] = []
 
     def placed(match: re.Match[str]) -> str:
@@ -82,7 +85,7 @@ def _ratio(law: str) -> _Ratio | None:
 
 
 def _of(node: ast.expr, found: list[str]) -> _Ratio:
-    """The ratio that a piece of the law is. Raises ValueError where it is none."""
+    """The ratio of a node of the law's syntax tree. Raises ValueError where it is none."""
     match node:
         case ast.Name("s" | "S"):
             return ["0", "1"], ["1"]

@@ -7,7 +7,7 @@ from cosim.errors import BadInput, printable
 
 MAX_LINE = 200_000
 UNKNOWN = ".unknown "
-"""Begins a line in place of one that ngspice must not see, with what is wrong with it."""
+"""Begins the replacement of a line that ngspice must not see; the reason follows."""
 COPY = "; copy its .model line into the netlist"
 
 
@@ -18,7 +18,7 @@ class Line:
     text: str
     file: str
     number: int
-    """0 of what is no line of the file."""
+    """The first of its lines in the file; 0 for text from elsewhere."""
 
     @property
     def place(self) -> str:

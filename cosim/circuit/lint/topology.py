@@ -1,6 +1,6 @@
 """Circuits that have no operating point: floating nodes and loops of ideal voltages.
 
-Subcircuits are expanded. An element of uncertain effect counts as one that makes it solvable.
+Subcircuits are expanded. An element of uncertain effect is taken to make the circuit solvable.
 """
 
 import re
@@ -17,8 +17,9 @@ MAX_ELEMENTS = 200_000
 MAX_DEPTH = 50
 
 _VOLTAGE = "vehl"
+"""Elements that are ideal voltages at the operating point, inductors included."""
 _LEAF = "rcd"
-"""Elements of no use with a free end."""
+"""Elements that have no effect with one end free."""
 _SHUNT = re.compile(r"\.opt\w*\s.*\brshunt\s*=", re.IGNORECASE)
 """An option that puts a resistor from every node to ground."""
 
@@ -34,7 +35,7 @@ class Part:
 
 
 class _Groups:
-    """Disjoint sets of nodes."""
+    """Disjoint sets of nodes (union-find)."""
 
     def __init__(self) -> None:
         self.parents: dict[str, str] = {}
@@ -47,7 +48,7 @@ class _Groups:
         return name
 
     def join(self, one: str, other: str) -> bool:
-        """Whether the two were apart."""
+        """Join the sets of two nodes; whether they were different sets."""
         one, other = self.find(one), self.find(other)
         self.parents[one] = other
         return one != other
@@ -69,7 +70,7 @@ def check_topology(top: Scope) -> None:
 
 @dataclass
 class _Expansion:
-    """The circuit with its subcircuits expanded, and what was met meanwhile."""
+    """Expands subcircuits, and collects their pins."""
 
     top: Scope
     elements: int = 0
@@ -126,7 +127,7 @@ def _check_ends(parts: list[Part], terminals: Counter[str], held: set[str]) -> N
 
 def _check_paths(parts: list[Part], held: set[str]) -> None:
     groups = _Groups()
-    # A controlled current may hold its node through a loop; so may whatever is not known.
+    # Nodes taken as safe: held ones, and those of controlled currents, which feedback may hold.
     loose = set(held)
     first: dict[str, Line] = {}
     for part in parts:
@@ -160,7 +161,7 @@ def _gives_voltage(element: Element) -> bool:
 
 
 def _check_loops(parts: list[Part]) -> None:
-    # A current that something reads may close the loop's equations.
+    # A voltage source whose current is read may be part of a solvable loop.
     read = {name for part in parts for name in sensed(part.element.line.text, "i")}
     read.update(name for part in parts if part.element.kind in "fhw" for name in part.element.words)
     groups = _Groups()

@@ -2,7 +2,7 @@
 
 import re
 
-_ASSIGNED = re.compile(r"\s*(?<![<>=!])=(?!=)\s*")
+_ASSIGNED = re.compile(r"\s*(?<![<>=!])=(?!=)\s*")  # "=", but no comparison
 _DEFINITION = re.compile(r"([a-z_]\w*)\s*(\([^()]*\))?\s*=(?!=)\s*", re.IGNORECASE)
 
 
@@ -11,7 +11,7 @@ NUMBER = re.compile(
 )
 _FACTORS = {"t": 1e12, "g": 1e9, "meg": 1e6, "k": 1e3, "mil": 25.4e-6, "m": 1e-3, "u": 1e-6,
             "n": 1e-9, "p": 1e-12, "f": 1e-15}  # fmt: skip
-"""1A is an ampere: only later versions of ngspice would have a for atto."""
+"""1A is an ampere: "a" for atto exists only in later versions of ngspice."""
 
 
 def word_set(text: str) -> frozenset[str]:
@@ -19,7 +19,7 @@ def word_set(text: str) -> frozenset[str]:
 
 
 def number(text: str) -> float | None:
-    """What ngspice takes the text for, if it is a plain number."""
+    """The value of a plain number as ngspice reads it, None for any other text."""
     match = NUMBER.fullmatch(text, text[:1] in ("+", "-"))
     if match is None:
         return None
@@ -77,7 +77,7 @@ def closing(text: str, place: int) -> int:
 
 
 def split_arguments(text: str) -> list[str]:
-    """What commas part, outside brackets."""
+    """The parts between commas outside brackets."""
     found = [""]
     place = 0
     while place < len(text):
@@ -112,7 +112,7 @@ def definitions(text: str) -> list[tuple[tuple[str, str | None], str]]:
 
 
 def split_assignments(found: list[str]) -> tuple[list[str], list[str]]:
-    """Words up to the first ``key=value`` or ``params:``, and the assignments after them."""
+    """The words before the first ``key=value`` or ``params:``, and the assignments after these."""
     for i, word in enumerate(found):
         if word in ("params:", "optional:", "text:") or "=" in word:
             return found[:i], [word for word in found[i:] if "=" in word]

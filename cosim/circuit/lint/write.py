@@ -1,8 +1,8 @@
-"""Writes a netlist's lines anew from what was parsed of them: ngspice sees no other text.
+"""Writes a netlist's lines anew from the parsed ones: ngspice sees no other text.
 
-It takes a name that is glued to a number for the next word (``vto=1level=8`` sets the level), and
-drops what it does not know in silence. Here each number ends where it ends for the reader, and what
-no element has is refused.
+ngspice takes a name glued to a number for the next word (``vto=1level=8`` sets the level), and
+ignores unknown words in silence. Here each number ends where a person sees its end, and unknown
+keys are refused.
 """
 
 import re
@@ -41,7 +41,7 @@ _KEYS = {
     "h": "value gain",
     "b": "v i tc1 tc2 temp dtemp reciproctc reciprocm m",
 }
-"""What elements may set, as ngspice 39 has it; a call of a subcircuit sets what that one has."""
+"""Keys that elements may have, by kind, in ngspice 39; for calls of subcircuits see ``checks``."""
 _ELSEWHERE = {
     "rser": "write a resistor in series", "lser": "write an inductor in series",
     "rpar": "write a resistor in parallel", "cpar": "write a capacitor in parallel",
@@ -56,12 +56,12 @@ _FORMS = {
     "vcvs": "with MAX and MIN write a B source",
     "vccs": "with MAX and MIN write a B source",
 } | dict.fromkeys(("and", "nand", "or", "nor"), "gates are not known here; write a B source")
-"""What ngspice would need code models for, where it could not be rewritten."""
+"""Words for which ngspice needs code models, where ``dialect`` could not rewrite them."""
 
 
 def written(line: Line, element: Element | None, values: Mapping[str, float]) -> str:
-    """The line's text anew, with ``values`` for the parameters of these names. Raises BadInput for
-    what the reader does not know."""
+    """The line's text written anew, with ``values`` for .param lines by name. Raises BadInput for
+    anything unknown."""
     text = line.text
     word = text.split()[0].lower()
     if element is not None:
@@ -98,7 +98,7 @@ def _element(element: Element) -> str:
     for part in head:
         if not _HEAD.fullmatch(part):
             element.refuse(f": {shown(part)} is no name")
-    if element.kind in "beghfvi":  # an expression, behind names that are none: a node 5V is no 5
+    if element.kind in "beghfvi":  # skip as many names as ``head`` has: a node 5V is no number
         names = re.match(rf"(?:[\s(),]*[^\s(),]+){{{len(head)}}}[\s),]*", line.text)
         rest = line.text[names.end() :] if names else ""
         return " ".join([*head, _expression(line, rest)])
