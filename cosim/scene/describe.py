@@ -1,4 +1,4 @@
-"""What the tables say about their keys, for messages, documentation and units."""
+"""Descriptions of the keys, read from the tables, for messages, documentation and units."""
 
 from dataclasses import dataclass
 from types import UnionType
@@ -22,13 +22,13 @@ class Key:
     high: float | None
     text: str
     variable: str
-    """The FMU's variable that the key is; empty where it is none."""
+    """The FMU's variable that the key sets; empty without one."""
     words: str = ""
-    """What may stand there, where neither kind nor choices say it."""
+    """The allowed values in words, where neither kind nor choices say them."""
 
     @property
     def title(self) -> str:
-        """What it is, for an axis: ``text`` without what it says after that."""
+        """The meaning, for an axis: ``text`` up to its first semicolon."""
         return self.text.partition(";")[0]
 
     @property
@@ -42,7 +42,7 @@ class Key:
 
     @property
     def allowed(self) -> str:
-        """What may stand there, as the end of "… must be …"."""
+        """The allowed values, as the end of "… must be …"."""
         if self.words:
             return self.words
         if self.choices:
@@ -58,7 +58,7 @@ class Key:
 
 
 def described(table: str, name: str) -> Key:
-    """What the table, or the list of tables, says of one of its keys."""
+    """The description of a key of a table, or of a list of tables."""
     field = (TABLES | PORT_LISTS)[table].model_fields[name]
     kind = field.annotation
     if get_origin(kind) in (UnionType, Union):
@@ -109,7 +109,7 @@ def acts(key: Key, rung: Rung, waveform: str, method: CouplingMethod) -> bool:
     if key.table == "circuit":
         return key.name in rung.keys - method.chooses
     if key.table == "coil":
-        return rung.driven or key.name == "count"  # as many rams take part in the energies
+        return rung.driven or key.name == "count"  # the energies include one ram per coil
     if key.table == "drive":
         if not rung.driven:
             return key.name in GIVEN_SURFACES.get(waveform, ())

@@ -72,12 +72,12 @@ def offset_pin(offset: float, amplitude: float) -> float:
 
 def staircase(maximum: int, frequency: float) -> tuple[int, ...]:
     """The DAC codes of one period, one each 50 µs, for a commanded ``frequency`` in Hz."""
-    p, q = _share(frequency).as_integer_ratio()
+    p, q = _share(frequency).as_integer_ratio()  # step k has the code maximum · (1 - k p/q)
     return tuple(maximum * (q - k * p) // q for k in range(ceil(Fraction(q, p))))
 
 
 def _share(frequency: float) -> Fraction:
-    """Of a period that a step takes."""
+    """The share of a period that one step of 50 µs takes."""
     return Fraction(frequency) / STEPS_PER_SECOND
 
 
@@ -89,24 +89,25 @@ def sampled(share: Callable[[float], float], maximum: int, frequency: float) -> 
 
 
 def period(frequency: float, loop_time: float | None) -> float:
-    """Of the staircase for a commanded ``frequency`` (Hz), or of passes of ``loop_time`` (s), s."""
+    """The period, s, for a commanded ``frequency`` (Hz): of the staircase in steps of 50 µs, or,
+    with a ``loop_time`` (s), in passes of the loop."""
     steps = ceil(1 / _share(frequency))
     if not loop_time:
         return steps / STEPS_PER_SECOND
     each = _passes_a_step(loop_time)
-    return (max(2, each - 1) + (steps - 1) * each + 1) * loop_time
+    return (max(2, each - 1) + (steps - 1) * each + 1) * loop_time  # as ``passes`` lays them out
 
 
 def _passes_a_step(loop_time: float) -> int:
-    return ceil(round(1 / (STEPS_PER_SECOND * loop_time), 9))
+    return ceil(round(1 / (STEPS_PER_SECOND * loop_time), 9))  # exact quotients stay whole
 
 
 def passes(codes: tuple[int, ...], loop_time: float) -> tuple[int, ...]:
     """The DAC codes of one period, one each pass of a loop of ``loop_time`` in s.
 
     ``codes`` are those of :func:`staircase`. A step is the fewest passes that take 50 µs. The
-    maximum is written one pass after the code 0, the counter set to it in the next, and the first
-    decrement made from the one after that on, once a step has passed since the code 0.
+    maximum is written one pass after the code 0. In the next pass the counter is set to it; the
+    first decrement comes later, once a step has passed since the code 0.
     """
     each = _passes_a_step(loop_time)
     falling = (code for code in codes[1:] for _ in range(each))

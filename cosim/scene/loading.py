@@ -49,18 +49,18 @@ def list_scenes() -> list[tuple[str, str]]:
 
 
 def _names() -> list[str]:
-    """Of the built-in scenes, the paper's first."""
+    """Names of the built-in scenes, the paper's first."""
     found = [path.stem for path in _LIBRARY.glob("*.toml")]
     return sorted(found, key=lambda name: (not name.startswith("paper"), name))
 
 
 def _builtin(name: str) -> dict[str, Any]:
-    """What the file of a built-in scene holds."""
+    """The content of a built-in scene's file."""
     return tomllib.loads((_LIBRARY / f"{name}.toml").read_text(encoding="utf-8"))
 
 
 def groups() -> dict[str, list[str]]:
-    """The names of the built-in scenes under what they are for."""
+    """The names of the built-in scenes, grouped by purpose."""
     return tomllib.loads(_LIBRARY.with_name("groups.toml").read_text(encoding="utf-8"))
 
 
@@ -141,8 +141,8 @@ def _layers(source: str) -> list[_Layer]:
 
 
 def _linked(source: str, builtin: list[str]) -> list[_Layer]:
-    """The built-in scene of a link, and its values. A link names no files: neither a scene's nor
-    any that a scene could read."""
+    """The layers of a link: its built-in scene, and its values. A link may name no files: neither a
+    scene file nor files that a scene reads."""
     name, pairs = link.parse(source)
     if name not in builtin:
         hint = messages.suggestion(name, builtin) or f" ({', '.join(builtin)})"
@@ -155,8 +155,8 @@ def _linked(source: str, builtin: list[str]) -> list[_Layer]:
 
 
 def to_link(scene: Scene) -> str:
-    """The shortest link that loads to an equal scene, but for its name and description. Raises
-    BadInput where no built-in scene with some keys changed is equal."""
+    """The link with the fewest keys that loads to an equal scene, name and description aside.
+    Raises BadInput where no built-in scene with some keys changed is equal."""
     wanted, found = _plain_values(scene), []
     for name in _names():
         there = _plain_values(load(name))
@@ -172,8 +172,8 @@ def to_link(scene: Scene) -> str:
 
 
 def _plain_values(scene: Scene) -> dict[str, Any]:
-    """The values by "table.key", without times of the run that follow from others."""
-    found = {f"{table}.{key}": x for table in TABLES for key, x in scene.table(table).items()}
+    """The values by "table.key", without ``settle`` and ``output_step`` where they are defaults."""
+    found = {f"{table}.{key}": v for table in TABLES for key, v in scene.table(table).items()}
     for key in {"settle", "output_step"} - scene.run.model_fields_set:
         del found[f"run.{key}"]
     return found
@@ -222,7 +222,8 @@ def _check_names(data: dict[str, Any], origin: str) -> None:
 
 
 def _check_list(name: str, content: Any, origin: str) -> None:
-    """Of ``[[fmu]]`` and ``[[port]]``; or, as an override has them, parameters of FMUs."""
+    """Check the names of keys in ``[[fmu]]`` and ``[[port]]``. An override has parameters of FMUs
+    instead, ``{"name.parameter": value}``, which pass."""
     if name == "fmu" and isinstance(content, dict) and all("." in key for key in content):
         return
     if not (isinstance(content, list) and all(isinstance(each, dict) for each in content)):
@@ -249,11 +250,12 @@ def _parsed(overrides: Iterable[str]) -> Iterator[tuple[str, Any]]:
         yield full, _value(right.strip())
 
 
+# fmu.NAME."PARAMETER"=VALUE, the parameter a TOML string.
 _QUOTED = re.compile(r'\s*(fmu\.\w+\.)("(?:[^"\\]|\\.)*")\s*=(.*)', re.DOTALL)
 
 
 def parted(text: str) -> tuple[str, str, str]:
-    """``table.key=value`` at its sign. A name with that sign in it is quoted, as in a scene."""
+    """``table.key=value`` split at "=". An FMU's parameter with "=" in its name is quoted."""
     if match := _QUOTED.fullmatch(text):
         return match[1] + str(_value(match[2])), "=", match[3]
     key, equals, value = text.partition("=")
@@ -281,7 +283,7 @@ def _tables(values: Iterable[tuple[str, Any]], origin: str) -> dict[str, Any]:
 
 
 def _find_files(tables: dict[str, Any], folder: Path, *more: Path) -> None:
-    """Make paths of files absolute: in the first folder that has the file, or else the first."""
+    """Make paths of files absolute: in the first folder that has the file, else in ``folder``."""
 
     def found(file: str) -> str:
         there = (place / file for place in (folder, *more))
@@ -306,7 +308,7 @@ def _value(text: str) -> Any:
         data = toml.parse(f"value = {text}")
     except (ValueError, RecursionError):
         return float(text) if _POINT.fullmatch(text) else text
-    return data["value"] if data.keys() == {"value"} else text
+    return data["value"] if data.keys() == {"value"} else text  # the text had more lines
 
 
 def _checked(layers: list[_Layer], default: str) -> Scene:
@@ -321,7 +323,7 @@ _TWINS = {
     "drive": KNOBS | {key: knob for knob, key in KNOBS.items()},
     "friction": dict(zip(NORMAL_FORCES, reversed(NORMAL_FORCES), strict=True)),
 }
-"""Keys of which one replaces the other, both ways, by table."""
+"""By table: pairs of keys, both ways, of which a later layer's key removes the other below it."""
 
 
 def _merge(layers: list[_Layer]) -> dict[str, Any]:
@@ -345,10 +347,10 @@ def _merge(layers: list[_Layer]) -> dict[str, Any]:
 def _with_parameters(
     fmus: list[dict[str, Any]], given: dict[str, Any], origin: str
 ) -> list[dict[str, Any]]:
-    """The FMUs with other values for parameters: ``{"name.parameter": value}``."""
+    """The FMUs with the parameters ``given`` changed: ``{"name.parameter": value}``."""
     for fmu in fmus:
         if not isinstance(fmu.get("name"), str) or not isinstance(fmu.get("parameters", {}), dict):
-            return fmus  # the scene's check tells what is wrong
+            return fmus  # the scene's check will refuse it
     found = [fmu | {"parameters": {**fmu.get("parameters", {})}} for fmu in fmus]
     by_name = {fmu["name"]: fmu for fmu in found}
     for key, value in given.items():
@@ -375,14 +377,15 @@ def _origins(layers: list[_Layer]) -> dict[str, tuple[int, str]]:
 
 
 FAR = 300.0
-"""Times its default: a length, mass or inductance so large is likely in mm, g or mH."""
+"""A length, mass or inductance of so many times its default is likely in mm, g or mH."""
 
 
 def _tell_doubts(scene: Scene, layers: list[_Layer]) -> None:
     """Warn of each key that the user changed although circuit, waveform or method ignore it, and of
     lengths, masses and inductances that are likely not in SI units.
 
-    Not where a later layer chose these, nor for a scene.toml, which has every key.
+    No warning where a later layer chose circuit, waveform or method, nor for a scene.toml, which
+    has every key.
     """
     origins = _origins(layers)
     chosen = scene.rung, scene.drive.waveform, METHODS[scene.coupling.method]
@@ -409,7 +412,7 @@ def _tell_doubts(scene: Scene, layers: list[_Layer]) -> None:
         steered = key.table == "circuit" and key.name in METHODS[scene.coupling.method].chooses
         choices += ["coupling.method"] * (steered or key.table == "coupling")
         latest = max(origins.get(choice, (-1, ""))[0] for choice in choices)
-        if rank < latest or scene.has_ports:  # whose keys are of another machine
+        if rank < latest or scene.has_ports:  # keys of the built-in machine mean nothing there
             continue
         chosen_law = attrgetter(choice)(scene) if acting else None
         if acting != chosen_law:

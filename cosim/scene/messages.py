@@ -48,7 +48,7 @@ def ended(sentence: str) -> str:
 
 
 def bad(sentence: str) -> BadInput:
-    """The error that tells :func:`ended`'s sentence."""
+    """A BadInput with the sentence, :func:`ended`."""
     return BadInput(ended(sentence))
 
 
@@ -64,13 +64,13 @@ def unknown_table(name: str) -> str:
 
 def unknown_key(table: str, name: str) -> str:
     """A sentence on a key that its table does not have."""
-    here = [key.name for key in keys() if key.table == table]
+    known = [key.name for key in keys() if key.table == table]
     full = f"{table}.{name}"
     hint = (
         full_name(name)
-        or suggestion(name, here, f"{table}.")
+        or suggestion(name, known, f"{table}.")
         or suggestion(full, KEYS)
-        or f" (keys of {table}: {', '.join(here)})"
+        or f" (keys of {table}: {', '.join(known)})"
     )
     return f'there is no key "{plain(full)}"{hint}'
 
@@ -94,7 +94,7 @@ def idle(key: Key, rung: Rung, waveform: str, method: CouplingMethod) -> str:
     able = [
         name
         for name, other in RUNGS.items()
-        if not other.automatic  # which becomes one of the others
+        if not other.automatic  # an automatic one becomes one of the others
         and (other.ngspice if key.table == "coupling" else acts(key, other, "sawtooth", method))
     ]
     if able:

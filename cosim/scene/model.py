@@ -34,21 +34,22 @@ from cosim.scene.tables import (
 from cosim.stepper.stepper import VARIABLES
 
 CAREFUL = {"max_step": 2e-5, "reltol": 1e-5}
-"""For circuits that nobody here knows; s, 1."""
+"""Defaults for a user's netlist; s, 1."""
 
 FASTEST = 1e-6
-"""Least time constant, s, that the integration in the FMU can follow all the time: of a coil, of a
-damper with its mass, and of a spring with its mass (the time of a radian)."""
+"""Least time constant, s, that the FMU's explicit integration can follow throughout a run: of a
+coil, of a damper with its mass, and of a spring with its mass (1/ω)."""
 
 FASTEST_NEAR, FASTEST_FAR, FAR = 1e-13, 1e-8, 2.0
-"""Least time constants, s, of a coil in ngspice: where a drive takes the output FAR times beyond
-its limits, which it then is at for a third of the time and more, and else, where a step's rounding
-is taken for a course towards them. Faster ones take above a minute for 0.1 s."""
+"""Least time constants, s, of a coil in ngspice; faster coils take above a minute for 0.1 s.
+FASTEST_FAR holds where the drive asks for more than FAR times the output's limit, so that the
+output is limited for a third of the time or more. FASTEST_NEAR holds otherwise; below it rounding
+within a step looks like a motion towards the limits."""
 
 _FAST = {*VARIABLES.values(), "n_surfaces", "coil_count", "initial_lift"} | {
     *("restitution", "tolerance"),  # of rigid walls, and of the FMU's own steps
 }
-"""Variables of the FMU that the fast solver takes, or that say nothing to it."""
+"""Variables of the FMU that the fast solver takes, or that have no meaning for it."""
 
 _FAST_NEEDS: list[tuple[str, Sequence[object], str]] = [
     ("circuit.model", ("limited", "ideal"), '"limited" or "ideal"'),
@@ -65,13 +66,13 @@ _FAST_NEEDS: list[tuple[str, Sequence[object], str]] = [
         if key.variable and key.variable not in _FAST
     ),
 ]
-"""What the fast solver models: keys, their allowed values, and these in words."""
+"""Conditions of the fast solver: keys, their allowed values, and these in words."""
 
 
 def averaged(count: int) -> int:
-    """Over how many periods of the drive to average where about ``count`` are meant: as many that
-    motion which repeats after 2, 3, 4, 6 or 8 of them does so within, if they are enough for it. A
-    mean that breaks such a motion is off by up to half of it."""
+    """The number of periods to average over where about ``count`` are wanted: a multiple of 24, 12,
+    6 or 2, so that motion which repeats only after 2, 3, 4, 6 or 8 periods is averaged over whole
+    repetitions, as far as ``count`` allows. A broken repetition biases the mean."""
     unit = next((each for each in (24, 12, 6, 2) if count >= 0.75 * each), 1)
     return (2 * count + unit) // (2 * unit) * unit
 
@@ -101,8 +102,7 @@ class Scene(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _fill(cls, data: Any) -> Any:
-        """A netlist of one's own is solved with smaller steps and tolerance by default, and coupled
-        with FMUs by what they can do and need."""
+        """Other defaults: CAREFUL for a user's netlist, the method "auto" with FMUs."""
         if not isinstance(data, dict):
             return data
         circuit, coupling = data.get("circuit", {}), data.get("coupling", {})
@@ -126,8 +126,8 @@ class Scene(BaseModel):
         return self
 
     def _fit_times(self) -> None:
-        """The mean over a broken period is off by per cents, so whole ones are the default, and as
-        many as motion mostly repeats in."""
+        """Set the defaults of ``settle`` and ``output_step``. A mean over a broken period is off by
+        per cents, so averages cover whole periods, as :func:`averaged` counts them."""
         given, duration = self.run.model_fields_set, self.run.duration
         fitted = {"output_step": min(self.run.output_step, duration / 2)}
         if "settle" not in given and self.drive.waveform == "file":
@@ -138,13 +138,13 @@ class Scene(BaseModel):
             count = averaged(half) or int(duration >= length)
             settle = round(max(0.0, duration - count * length), 14)  # as one writes it
             fitted["settle"] = settle if count else duration / 2
-        # Not as what was given: another drive or duration has another default.
+        # Not marked as given (model_fields_set): another drive or duration has another default.
         known = {name: getattr(self.run, name) for name in given}
         run = Run.model_construct(given, **fitted | known)
         object.__setattr__(self, "run", run)
 
     def _check_ports(self) -> None:
-        """What can be known of ports before the FMUs and the netlist are read."""
+        """Check ports as far as possible without reading the FMUs and the netlist."""
         method, model = self.coupling.method, self.circuit.model
         if not self.has_ports and method in OF_PORTS[2:]:
             raise fault(f'coupling.method = "{method}" is for scenes with [[port]]')
@@ -180,13 +180,14 @@ class Scene(BaseModel):
                     raise fault(f'[[port]] {key} = "{end}" is given twice')
 
     def _check_machine(self) -> None:
-        """Ports of the built-in machine alone say what the netlist calls what it needs."""
+        """Check ports of a scene without FMUs, which only name the machine's sources and vectors in
+        the netlist."""
         for port in self.port:
             end = port.to or port.origin
             if port.scale != 1.0 or port.offset != 0.0:
                 raise fault(f"the port {port.words}: without [[fmu]] scale must be 1 and offset 0")
-            here = port.source if end in MACHINE_ENDS[:2] else port.probe
-            if end not in MACHINE_ENDS or here is None:
+            in_netlist = port.source if end in MACHINE_ENDS[:2] else port.probe
+            if end not in MACHINE_ENDS or in_netlist is None:
                 raise fault(
                     f'the port {port.words} must be one of from = "drive" or "machine.back_emf" to '
                     'a source and probe to "machine.current", "machine.out" or "machine.sense"'
@@ -223,7 +224,7 @@ class Scene(BaseModel):
                 )
 
     def _check_speed_of_circuit(self) -> None:
-        """At the output's limits each step of ngspice lasts a time constant of the coil."""
+        """At the output's limits each step of ngspice is as short as the coil's time constant."""
         drive, circuit, coil = self.drive, self.circuit, self.coil
         peak, sense = abs(drive.offset) + drive.amplitude / 2.0, circuit.sense_resistance
         around = coil.resistance + coil.count * sense
@@ -241,7 +242,8 @@ class Scene(BaseModel):
             )
 
     def _check_speed_of_mechanics(self) -> None:
-        """The same of what acts on the bodies at every moment; for the rest see Pace."""
+        """Springs and dampers that act all the time must not be stiff either; for the walls see
+        ``Pace``."""
         if self.surface_is_given:
             return
         rig = self.mechanics
@@ -279,8 +281,8 @@ class Scene(BaseModel):
         )
 
     def _need(self, why: str, *needed: tuple[str, Sequence[object], str]) -> None:
-        """Raise where a key has no allowed value; what is needed is a key, these, and the same in
-        words."""
+        """Raise where a key's value is not allowed; ``needed`` are keys, their allowed values, and
+        these in words."""
         for full, allowed, words in needed:
             table, _, key = full.partition(".")
             value = getattr(getattr(self, table), key)
@@ -289,8 +291,7 @@ class Scene(BaseModel):
                 raise fault(f"{why}; with it {full} = {shown} must be {words}")
 
     def _check_solver(self) -> None:
-        """The fast solver has the machine's common case, and takes no variable of the FMU that is
-        not in its own table."""
+        """The fast solver models the machine's common case only: see _FAST_NEEDS."""
         if self.run.solver != "fast":
             return
         why = 'run.solver = "fast" has fixed steps for one free ram'
@@ -347,8 +348,8 @@ class Scene(BaseModel):
 
     @property
     def period(self) -> float:
-        """Of what drives the scene, s; infinite where nothing does, and with a surface moved by a
-        file. That of the firmware's staircase differs from 1 / ``drive.frequency``."""
+        """The drive's period, s; infinite without a drive, and for a surface moved by a file. For
+        the firmware's staircase it differs from 1 / ``drive.frequency``."""
         drive = self.drive
         if self.has_ports and not any(port.origin == "drive" for port in self.port):
             return inf
@@ -367,15 +368,15 @@ class Scene(BaseModel):
 
     @property
     def has_ports(self) -> bool:
-        """Whether ports join more than the built-in machine to the circuit, or join that as an FMU
-        like others, by a method for these alone."""
+        """Whether ports join FMUs to the circuit, or the built-in machine as if it were an FMU, by
+        a method for scenes with ports only."""
         alike = self.coupling.method in OF_PORTS[2:]
         return bool(self.fmu) or (bool(self.port) and (alike or not self.renamed))
 
     @property
     def renamed(self) -> dict[str, str]:
-        """Where ports join a netlist to the built-in machine alone: by each end of the machine, of
-        MACHINE_ENDS, the netlist's own name for it."""
+        """If ports join a netlist to the built-in machine alone: the netlist's own names, by the
+        machine's ends (MACHINE_ENDS); else empty."""
         names = {str(p.to or p.origin): str(p.source or p.probe) for p in self.port}
         of_machine = any(end.startswith(f"{MACHINE}.") for end in names)
         return names if of_machine and not self.fmu else {}
@@ -397,8 +398,8 @@ class Scene(BaseModel):
         return data | {name: self.table(name) for name in PORT_LISTS if getattr(self, name)}
 
     def having(self, **tables: dict[str, Any]) -> "Scene":
-        """The scene with other values for keys of some tables, which nobody checks."""
-        changed = {table: getattr(self, table).model_copy(update=x) for table, x in tables.items()}
+        """The scene with other values for keys of some tables, which are not checked."""
+        changed = {name: getattr(self, name).model_copy(update=own) for name, own in tables.items()}
         return self.model_copy(update=changed)
 
     def table(self, name: str) -> Any:
@@ -448,8 +449,8 @@ def schema() -> dict[str, Any]:
 def to_toml(scene: Scene, base: str = "") -> str:
     """The resolved scene as TOML: every key with its unit and meaning; loads to an equal scene.
 
-    A key without a value, or with the one that a knob gives it, is a comment. With the name of a
-    built-in scene as ``base`` all keys are: the file is then one to begin with.
+    A key without a value, or set by a knob, is commented out. With the name of a built-in scene as
+    ``base`` all keys are: the file is then a template.
     """
     data = scene.as_dict()
     first = {"base": base} if base else {"name": scene.name}
@@ -477,7 +478,7 @@ def differing(scene: Scene) -> list[str]:
     for line in to_toml(scene).splitlines()[2:]:
         if line.startswith("["):
             while found and found[-1].startswith("[") and not found[-1].startswith("[["):
-                found.pop()  # a table with nothing in it
+                found.pop()  # an empty table
             found.append(line)
         elif line and line not in usual and not line.startswith("#"):
             found.append(line)

@@ -121,7 +121,7 @@ _METHODS = (
 )
 
 OF_PORTS = ("auto", "step-locked", "macro-steps", "redo")
-"""Those for a scene with its own ports; of them the last two are for no other."""
+"""Methods for a scene with its own ports; the last two are for such scenes only."""
 
 METHODS = {method.name: method for method in _METHODS}
 """Every method by its name; the order is that in which messages list them."""

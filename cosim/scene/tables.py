@@ -1,7 +1,7 @@
 """The tables of a scene: every key with its SI unit, default, range and meaning.
 
-A key that is a variable of the FMU has them from ``variables.def``, of which the FMU's
-``modelDescription.xml`` is made too.
+Keys that are variables of the FMU take these from ``variables.def``, from which the FMU's
+``modelDescription.xml`` is made, too.
 """
 
 import re
@@ -17,6 +17,7 @@ from cosim.files.resources import fmu_sources
 from cosim.scene import firmware
 from cosim.scene.rungs import METHODS, RUNGS, CouplingMethod, Rung
 
+# KIND(name, "unit", start, least, greatest, "text"); some rows have no unit.
 _ROW = re.compile(
     r'^(INT_)?(?:PARAMETER|TUNABLE|INPUT)\((\w+), (?:"(.*?)", )?(.*?), (.*?), (.*?), "(.*)"\)$',
     re.MULTILINE,
@@ -25,8 +26,8 @@ _ROW = re.compile(
 
 @cache
 def _variables() -> dict[str, tuple[float | int, str, float, float, str]]:
-    """Start value (an int where the variable is one), unit, least and greatest value, and meaning,
-    of the FMU's parameters and inputs. Raises BadInput where its sources are missing."""
+    """By name of the FMU's parameters and inputs: start value (int for integer variables), unit,
+    least and greatest value, meaning. Raises BadInput where the FMU's sources are missing."""
     source = next((fmu_sources() / "src").rglob("variables.def")).read_text(encoding="utf-8")
     return {
         name: (int(start) if whole else float(start), unit or "1", float(low), float(high), text)
@@ -52,7 +53,7 @@ def _of_fmu(name: str, least: float | None = None) -> Any:
 
 
 def _choice(default: Any, text: str, unit: str = "", words: str = "") -> Any:
-    """Of any kind; ``words`` say what may stand there, where its type does not."""
+    """A key of any type; ``words`` are its allowed values, where the type does not say them."""
     return Field(default, description=text, json_schema_extra={"unit": unit, "words": words})
 
 
@@ -65,9 +66,10 @@ def _declared(default: str, lead: str, registry: Mapping[str, Rung | CouplingMet
 
 
 def fault(sentence: str, *unnamed: str) -> PydanticCustomError:
-    """A failed check between the keys ("table.key") that ``sentence``, without its dot, names.
+    """A failed check of the keys ("table.key") that ``sentence``, without its full stop, names.
 
-    It is told of the layer that gave the last of these, or of the ``unnamed`` that play a part too.
+    The message blames the last layer that gave any of these, or of the ``unnamed`` keys, which are
+    involved but not in the sentence.
     """
     keys = [*re.findall(r"\b[a-z]+\.[a-z]\w*", sentence), *unnamed]
     return PydanticCustomError("check", "{sentence}", {"sentence": sentence, "keys": keys})
@@ -105,13 +107,13 @@ class Table(BaseModel):
 
 
 FRAME_RATE = 960.0
-"""1/s: of the published trials' camera."""
+"""Frames per second of the published trials' camera."""
 
 SHORTEST = 1e-9
-"""s: of what is left after settling, and of a row."""
+"""s: the least time between ``settle`` or ``output_step`` and the duration."""
 
 LONGEST_NAME = 63
-"""Characters of a source that is fed."""
+"""Characters in the name of a source that a port feeds."""
 
 PATHS = (("circuit", "netlist"), ("drive", "file"), ("friction", "normal_force_file"))
 """The keys that name files."""
@@ -127,7 +129,7 @@ _Waveform = Literal[
 ]  # fmt: skip
 
 MOST_CORNERS = 64
-"""Of a table."""
+"""Most pairs of ``drive.table``."""
 
 _Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 _Table = Annotated[list[_Pair], Field(min_length=1, max_length=MOST_CORNERS)]
@@ -143,7 +145,7 @@ _SHAPES = {
 """Keys of ``[drive]`` and the waveforms that they are for."""
 
 CORNERS_APART = 1e-9
-"""s, at least: less could not be told from a jump after hours of simulated time."""
+"""s: least distance of two corners; after hours of simulated time less rounds to a jump."""
 
 LEVEL_KEY = re.compile(r"table\.([1-9]\d?)")
 """The level of a pair of ``drive.table``, the first being 1, as a key of its own."""
@@ -230,7 +232,7 @@ class Drive(Table):
             if data.get(knob) is not None and key in data:
                 raise fault(said_twice(f"drive.{knob}", f"drive.{key}"))
 
-        # anything else fails in the validation of the knob itself
+        # Other values fail in the validation of the knob itself.
         pots = {k: data.get(k) for k in KNOBS if is_number(data.get(k)) and 0 <= data[k] <= 1}
         if "pot_max" in pots:
             data["amplitude"] = firmware.knob_amplitude(pots["pot_max"])
@@ -242,7 +244,7 @@ class Drive(Table):
         return _with_levels(data)
 
     def _check(self) -> None:
-        # The other way round is told when it is run, so that a scene can leave the file open.
+        # A waveform "file" without a file is refused only when run: a scene may leave it open.
         if self.file is not None and self.waveform != "file":
             raise fault(f'drive.file is for drive.waveform = "file", not for "{self.waveform}"')
         for key, able in _SHAPES.items():
@@ -290,7 +292,7 @@ class Drive(Table):
 
 
 def _with_levels(data: dict[str, Any]) -> dict[str, Any]:
-    """The keys of a drive with those of single levels written into its table."""
+    """The keys of a drive, with single levels (``table.3``) moved into its table."""
     levels = {name: data.pop(name) for name in [*data] if LEVEL_KEY.fullmatch(name)}
     table = data.get("table")
     for name, value in levels.items():
@@ -469,7 +471,7 @@ _LAWS = {
 ACT_WITH = {f"mechanics.{key}": choice for choice, own in _LAWS.items() for key in own} | {
     "run.step": ("run.solver", "fast")
 }
-"""Keys that act with one value of another key alone: that key, and the value."""
+"""Keys that act only with one value of another key: the other key, and that value."""
 
 
 class Friction(Table):
@@ -642,7 +644,7 @@ class Port(Table):
     @field_validator("source", "probe")
     @classmethod
     def _read(cls, name: str | None) -> str | None:
-        """As the netlist is read, in which LTspice puts § between a part's kind and its name."""
+        """Replace LTspice's § between a part's kind and its name, as reading of netlists does."""
         return name and name.replace("\u00a7", "_")
 
     @property
@@ -673,10 +675,11 @@ MACHINE = "machine"
 """The name by which ports call the built-in machine."""
 
 MACHINE_ENDS = ("drive", *(f"{MACHINE}.{end}" for end in ("back_emf", "current", "out", "sense")))
-"""What a netlist needs of the built-in machine, or has for it; the last two are the coils' ends."""
+"""Ends of ports to the built-in machine: its outputs to sources of the netlist (the first two),
+then its inputs, the coils' current and the voltages of their two ends."""
 
 PORT_LISTS: dict[str, type[Table]] = {"fmu": Fmu, "port": Port}
-"""Lists of tables: what a scene with its own machine is made of."""
+"""Lists of tables, for scenes with a machine of their own."""
 
 TABLES: dict[str, type[Table]] = {
     "drive": Drive,

@@ -1,4 +1,4 @@
-"""TOML of strangers, parsed in a time that grows with its length."""
+"""Parses TOML from untrusted files, in a time that grows linearly with its length."""
 
 import re
 import tomllib
@@ -9,11 +9,13 @@ from cosim.errors import BadInput, plain
 from cosim.files import reader
 
 MOST_PARTS = 8
-"""Of a dotted key: a scene's have two. tomllib takes the square of their number: hours for 1 MB."""
+"""Most parts of a dotted key; a scene's have two. tomllib takes quadratic time in them: hours for
+1 MB."""
 
 LARGEST = 1 << 20
 """Bytes of a file; far above any honest one."""
 
+# Strings of all four kinds and comments, also unfinished ones, which end with their line or file.
 _STRINGS = re.compile(
     r'"""(?:[^\\]|\\.)*?(?:"{3,5}|\Z)'
     r"|'''.*?(?:'{3,5}|\Z)"
@@ -45,6 +47,6 @@ def read(path: Path | str) -> dict[str, Any]:
         raise BadInput(f"{name}: this is not TOML: too deeply nested.") from None
     except ValueError as error:
         why = plain(error)
-        if why.startswith("Exceeds the limit"):  # Python's words for who programs in it
+        if why.startswith("Exceeds the limit"):  # Python's message means its own int()
             why = "a whole number in it has thousands of digits"
         raise BadInput(f"{name}: this is not TOML: {why}.") from None
