@@ -1,9 +1,9 @@
-"""A fence around this process, for good: what is not asked for, it can no longer do.
+"""A sandbox that this process closes around itself, irrevocably.
 
-On Linux, Landlock (since 5.13) lets it read the libraries and the paths that it is given, and write
-nothing but its own folder; a seccomp filter lets it start no program and open no socket. Both need
-no rights of their own. Elsewhere only the limits of :func:`_limit` hold. What a library reads as it
-starts must be read before.
+On Linux, Landlock (since 5.13) lets the process read only libraries and the given paths, and write
+only its working folder; a seccomp filter denies starting programs and opening sockets. Neither
+needs privileges. On other systems only the limits of :func:`_limit` hold. Libraries that read other
+files when they start must be loaded before.
 
 Sources: Landlock's user space API and seccomp_data, as linux/landlock.h and linux/seccomp.h of 6.18
 have them; the numbers of system calls are those of x86-64 and of arm64.
@@ -18,13 +18,13 @@ from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
-_NO_NEW_PRIVILEGES, _SET_SECCOMP, _FILTER = 38, 22, 2
+_NO_NEW_PRIVILEGES, _SET_SECCOMP, _FILTER = 38, 22, 2  # prctl: options, and a mode of seccomp
 _CREATE, _ADD, _RESTRICT = 444, 445, 446  # system calls of Landlock
 
 _EXECUTE, _WRITE, _READ, _LIST = 1, 2, 4, 8
-_ON_FILES = _EXECUTE | _WRITE | _READ | 1 << 14
+_ON_FILES = _EXECUTE | _WRITE | _READ | 1 << 14  # rights that apply to files, with truncation
 _RIGHTS = (13, 14, 15, 15, 16)
-"""How many rights to files each version of Landlock knows, from the first on."""
+"""Number of rights to files that each version of Landlock knows, from version 1 on."""
 
 _FILES, _DEVICES = ("/etc/ld.so.cache", "/etc/localtime"), ("/dev/null", "/dev/urandom")
 _SITES = ("site-packages", "dist-packages")
@@ -43,24 +43,25 @@ _DENIED = {
         39 40 41 51 58 60 89 97 104 105 106 112 142 161 162 170 171 217 218 219 224 225 241 265 266
         268 273 280 282 294 425""", 220, (131, 261, 122)),
 }  # fmt: skip
-"""By machine: its name in seccomp_data; the calls that fail (sockets; new programs; signals to
-others; others' memory; others' priorities; memory, semaphores and messages that processes share;
-watching files; truncating files, which Landlock forbids from version 3 on, and their owners, modes,
-times and attributes; what only root can do, and io_uring, which would pass the filter by); clone,
-which may make threads only; tgkill, which may reach this process only, and prlimit and
-sched_setaffinity, which may name none but the caller."""
+"""By machine: its number in seccomp_data; the denied calls (sockets; new programs; signals to other
+processes; their memory; their priorities; shared memory, semaphores and messages; watching files;
+truncating files, which Landlock forbids from version 3 on, and their owners, modes, times and
+attributes; calls for root only, and io_uring, which would bypass the filter); clone, allowed for
+threads only; tgkill, allowed to this process only, and prlimit and sched_setaffinity, allowed for
+the caller only."""
 _CLONE3, _CLONE_THREAD = 435, 0x10000
+# Results of the filter: EPERM, ENOSYS, allowed, and the end of the process.
 _DENY, _UNKNOWN, _ALLOW, _KILL = 0x50001, 0x50026, 0x7FFF0000, 0x80000000
 
 _OPEN_FILES = 256
 
 lacking: tuple[str, ...] = ()
-"""What this system does not have of the fence, once :func:`close` was called."""
+"""Parts of the fence that this system lacks; set by :func:`close`."""
 
 
 def close(reads: Iterable[str]) -> None:
-    """Close the fence: from now on this process reads the libraries and what lies at or below the
-    paths ``reads``, and writes the working folder. Threads that run already stay outside."""
+    """Close the fence: from now on this process can read only libraries and what lies at or below
+    the paths ``reads``, and write only the working folder. Running threads stay outside."""
     global lacking
     _limit()
     if not sys.platform.startswith("linux"):
@@ -73,7 +74,7 @@ def close(reads: Iterable[str]) -> None:
 
 
 def _limit() -> None:
-    """No more memory than half of what the machine has, no core file, few files at a time."""
+    """Limit memory to half of the machine's, forbid core files, allow few open files."""
     with suppress(ImportError):
         import resource
 
@@ -89,7 +90,7 @@ def _limit() -> None:
 
 def _lock(system: ctypes.CDLL, reads: Iterable[str]) -> bool:
     """Whether Landlock holds from now on."""
-    version = system.syscall(_CREATE, None, 0, 1)
+    version = system.syscall(_CREATE, None, 0, 1)  # flag 1 asks for the version
     if version < 1:
         return False
     every = (1 << _RIGHTS[min(version, len(_RIGHTS)) - 1]) - 1
@@ -101,7 +102,7 @@ def _lock(system: ctypes.CDLL, reads: Iterable[str]) -> bool:
     reading = {*_libraries(), *_FILES, *_DEVICES, *reads}
     allowed = [(path, _READ | _LIST) for path in reading] + [("/dev/null", _WRITE)]
     for path, rights in [*allowed, (os.getcwd(), every & ~_EXECUTE)]:
-        with suppress(OSError, ValueError):  # there is no such path, or can be none
+        with suppress(OSError, ValueError):  # a path that is missing or impossible
             place = os.open(path, os.O_PATH | os.O_CLOEXEC)
             rights &= every if os.path.isdir(path) else _ON_FILES
             system.syscall(_ADD, rules, 1, struct.pack("=Qi", rights, place), 0)
@@ -112,7 +113,7 @@ def _lock(system: ctypes.CDLL, reads: Iterable[str]) -> bool:
 
 
 def _libraries() -> set[str]:
-    """Where the code lies that runs here, and what the loader looks through."""
+    """Folders of loaded packages, of site-packages, and of the loader's search path."""
     packages = [module for name, module in sys.modules.items() if "." not in name]
     found = [place for module in packages for place in getattr(module, "__path__", ())]
     found += [path for path in sys.path if Path(path).name in _SITES]
@@ -127,20 +128,22 @@ def _filter(system: ctypes.CDLL) -> bool:
     if machine not in _DENIED or sys.maxsize < 1 << 32:
         return False
     name, denied, clone, (tgkill, *own) = _DENIED[machine]
+    # BPF: an instruction is (code, jump if true, jump if false, operand). Loads take an offset into
+    # seccomp_data: 0 the call, 4 the machine, 16 the low half of the first argument.
     load, equal, above, has, end = 0x20, 0x15, 0x35, 0x45, 0x06
 
     def only(call: int, test: int, value: int) -> list[tuple[int, int, int, int]]:
-        """The call passes if its first argument passes the test."""
+        """Allow the call if its first argument passes the test, else deny it."""
         return [
             (equal, 0, 4, call), (load, 0, 0, 16), (test, 0, 1, value),
             (end, 0, 0, _ALLOW), (end, 0, 0, _DENY),
         ]  # fmt: skip
 
     program = [(load, 0, 0, 4), (equal, 1, 0, name), (end, 0, 0, _KILL), (load, 0, 0, 0)]
-    program += [(above, 0, 1, 1 << 30), (end, 0, 0, _KILL)]  # the second numbering of x86-64
+    program += [(above, 0, 1, 1 << 30), (end, 0, 0, _KILL)]  # x32 calls, a second set of x86-64
     for call in map(int, denied.split()):
         program += [(equal, 0, 1, call), (end, 0, 0, _DENY)]
-    program += [(equal, 0, 1, _CLONE3), (end, 0, 0, _UNKNOWN)]  # then clone is tried
+    program += [(equal, 0, 1, _CLONE3), (end, 0, 0, _UNKNOWN)]  # the C library then tries clone
     program += only(clone, has, _CLONE_THREAD) + only(tgkill, equal, os.getpid())
     for call in own:
         program += only(call, equal, 0)

@@ -1,4 +1,4 @@
-"""Ctrl-C, and what ends a command as it does: SIGTERM, and SIGHUP of a terminal that closes."""
+"""Handling of Ctrl-C, and of SIGTERM and SIGHUP (a terminal that closes), which act alike."""
 
 import _thread
 import signal
@@ -10,26 +10,26 @@ from types import FrameType
 from typing import Any
 
 Handler = Any
-"""What the module signal takes and gives for one."""
+"""A signal handler, as the module signal takes and returns it."""
 
 SIGNALS = [each for each in signal.Signals if each.name in ("SIGINT", "SIGTERM", "SIGHUP")]
 
 
 GRACE = 30
-"""s; a command that has not ended so long after a signal is ended by the system."""
+"""s after a signal until the system ends a command that is still there."""
 
 AGAIN = 0.02
-"""s after which a signal is raised again that was lost."""
+"""s after which a lost signal is raised again."""
 
 
 @contextmanager
 def ended_alike() -> Iterator[None]:
-    """Within this context all of SIGNALS raise KeyboardInterrupt, but for those that whoever
-    started this process has had ignored, as nohup does.
+    """Within this context all of SIGNALS raise KeyboardInterrupt, except those that were set to be
+    ignored when this process started, as nohup does.
 
-    Python ignores what is raised where it frees an object, so a signal that strikes there is raised
-    again. Where memory has run out it may lose one all the same, and what tidies up may hang: GRACE
-    later the system ends the process.
+    Python ignores exceptions raised while it frees an object, so a signal there is raised again.
+    Without free memory a signal may still be lost, or the cleanup hang: after GRACE the system ends
+    the process.
     """
     alarm = getattr(signal, "alarm", lambda seconds: None)
     armed = False
@@ -41,24 +41,24 @@ def ended_alike() -> Iterator[None]:
         raise KeyboardInterrupt
 
     def ignored(what: "sys.UnraisableHookArgs") -> None:
-        if isinstance(what.exc_value, KeyboardInterrupt):  # here it would be ignored once more
+        if isinstance(what.exc_value, KeyboardInterrupt):  # raised here it would be ignored again
             threading.Timer(AGAIN, _strike).start()
         else:
-            told(what)
+            hook(what)
 
-    told, sys.unraisablehook = sys.unraisablehook, ignored
+    hook, sys.unraisablehook = sys.unraisablehook, ignored
     known = (signal.SIG_DFL, signal.default_int_handler)
     try:
         with _handled(lambda before: interrupt if before in known else None):
             yield
     finally:
-        sys.unraisablehook = told
+        sys.unraisablehook = hook
         if armed:
             alarm(0)
 
 
 def _strike() -> None:
-    """Send SIGINT to the main thread, whatever it waits for; Windows has no such signal."""
+    """Send SIGINT to the main thread, to interrupt any wait; on Windows only set the interrupt."""
     if sys.platform == "win32":
         _thread.interrupt_main()
     else:
@@ -67,9 +67,8 @@ def _strike() -> None:
 
 @contextmanager
 def caught_signals(fail: Callable[[BaseException], None]) -> Iterator[None]:
-    """Hand what a signal raises to ``fail`` while compiled code runs that calls back into Python
-    (raised outside a callback's try, C would swallow it), or where nothing may be left half done.
-    """
+    """Pass exceptions of signal handlers to ``fail`` instead of raising them: while compiled code
+    calls back into Python, where C would swallow them, or where nothing may be left half done."""
 
     def caught(before: Handler) -> Handler | None:
         if not callable(before):
@@ -89,8 +88,8 @@ def caught_signals(fail: Callable[[BaseException], None]) -> Iterator[None]:
 
 @contextmanager
 def deferred() -> Iterator[None]:
-    """Let what a signal raises wait for the end of this context: a module of compiled code that was
-    interrupted while it was loaded cannot be loaded again."""
+    """Raise exceptions of signal handlers only at the end of this context: a compiled module whose
+    loading was interrupted cannot be loaded again."""
     held: list[BaseException] = []
     with caught_signals(held.append):
         yield
@@ -100,7 +99,7 @@ def deferred() -> Iterator[None]:
 
 @contextmanager
 def _handled(choose: Callable[[Handler], Handler | None]) -> Iterator[None]:
-    """Have each signal handled as ``choose`` says, knowing how it is now; None leaves that."""
+    """Replace each signal's handler by what ``choose`` makes of it; None leaves it."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -1,8 +1,8 @@
-"""What the C of the package was compiled to when the package was installed.
+"""The package's compiled C libraries, built when the package was installed.
 
-The build also wrote down the functions and structures of each library, as its C declares them. A
-library that is damaged, cut off or of another build would end the process, or compute something
-else, once it is loaded: each file is held against the size and hash that the build wrote down.
+The build records each library's functions and structures, as its C declares them, and each file's
+size and hash. Files are checked against these before they are loaded: a damaged library, or one of
+another build, could end the process or compute wrong results.
 """
 
 import ctypes
@@ -23,7 +23,7 @@ SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 
 _AGAIN = "install it again (in a checkout, with `make setup`)"
 _OTHERS = 0o002
-"""The mode of a file or folder that every user may write."""
+"""The permission bit by which every user may write a file or folder."""
 
 
 CALLBACK = ctypes.CFUNCTYPE(None)
@@ -33,7 +33,7 @@ _TYPES: dict[str, Any] = {
     **{name: getattr(ctypes, f"c_{name}") for name in ("char", "bool", "int", "long", "double")},
     **{"void": None, "*": ctypes.c_void_p, "()": CALLBACK},
 }
-"""What the build's words for types stand for."""
+"""ctypes' types by the build's words for them."""
 
 
 @cache
@@ -46,8 +46,8 @@ def library(name: str) -> ctypes.CDLL:
     except OSError as error:
         raise BadInput(f"The compiled library {path} cannot be loaded: {error}.") from error
     for function, (result, arguments) in _built(name)["interfaces"][name]["functions"].items():
-        of = getattr(found, function)
-        of.restype, of.argtypes = _TYPES[result], [_TYPES[kind] for kind in arguments]
+        entry = getattr(found, function)
+        entry.restype, entry.argtypes = _TYPES[result], [_TYPES[kind] for kind in arguments]
     return found
 
 
@@ -57,6 +57,7 @@ def structures(name: str) -> dict[str, type[ctypes.Structure]]:
     known = dict(_TYPES)
     declared = _built(name)["interfaces"][name]["structures"]
     for structure, fields in declared.items():
+        # An array of several dimensions is an array of arrays: the last length is innermost.
         kinds = [
             (field, reduce(mul, reversed(lengths), known[kind])) for field, kind, lengths in fields
         ]
@@ -66,7 +67,7 @@ def structures(name: str) -> dict[str, type[ctypes.Structure]]:
 
 
 def _built(name: str) -> dict[str, Any]:
-    """What the build wrote down; the shared library ``name`` is checked against it."""
+    """The build's record, with the shared library ``name`` checked against it."""
     path = compiled(name + SUFFIX)
     return json.loads((path.parent / "build.json").read_bytes())
 
@@ -84,8 +85,8 @@ def ngspice_library() -> str:
 
 @cache
 def _found_library(prefix: str) -> str | None:
-    """That of Python's own environment, where it has one as conda's do, of the system, or of
-    Homebrew. The system's loader is asked by programs, which takes some milliseconds."""
+    """The library of Python's environment (as conda's have), of the system, or of Homebrew.
+    ``find_library`` starts programs, which takes some milliseconds."""
     own = (f"{prefix}/lib/libngspice{SUFFIX}", f"{prefix}/Library/bin/ngspice.dll")
     brewed = (f"{folder}/libngspice.dylib" for folder in ("/opt/homebrew/lib", "/usr/local/lib"))
     # Debian's runtime package has only the versioned name, which the loader's own search finds.
@@ -94,13 +95,13 @@ def _found_library(prefix: str) -> str | None:
 
 
 def digest(name: str) -> str:
-    """The hash of the shared library ``name``, as the build wrote it down."""
+    """The hash of the shared library ``name`` in the build's record."""
     return _built(name)["files"][name + SUFFIX][1]
 
 
 def compiled(name: str) -> Path:
-    """The absolute path of one of the compiled files or folders; BadInput if it is missing, if what
-    is there is not what was built, or if it is open to others."""
+    """The absolute path of a compiled file or folder; BadInput if it is missing, differs from the
+    build's record, or can be written by every user."""
     _check(FOLDER, name)
     return FOLDER / name
 
@@ -129,7 +130,7 @@ def _check(folder: Path, name: str) -> None:
 
 
 def _check_writers(folder: Path, paths: list[Path]) -> None:
-    """Refuse what others may write to, unless they may write to this very code."""
+    """Refuse paths that every user may write, unless this very module can be written by them."""
     ours = Path(__file__).stat().st_mode | folder.parent.stat().st_mode
     if os.name != "posix" or ours & _OTHERS:
         return

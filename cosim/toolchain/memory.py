@@ -1,4 +1,4 @@
-"""Whether there is the memory to begin with: libraries that find too little end the process."""
+"""Checks for enough memory before a command starts: libraries that lack it end the process."""
 
 import sys
 from collections.abc import Iterator
@@ -8,11 +8,11 @@ from pathlib import Path
 from cosim.errors import SimulationFailed
 
 LEAST, USUAL = {"scenes": 0, "fmu": 120, "export": 180}, 240
-"""MB of addresses that a command was seen to need; it fills a third of them and more."""
+"""MB of address space that commands were observed to need; they fill at least a third of it."""
 
 
 def check(command: str, root: Path = Path("/")) -> None:
-    """Raise SimulationFailed where the command cannot have what it needs at least."""
+    """Raise SimulationFailed where a limit of this process is below the command's least need."""
     if sys.platform == "linux":
         import resource
 
@@ -27,7 +27,7 @@ def check(command: str, root: Path = Path("/")) -> None:
 
 
 def _groups(root: Path) -> Iterator[int]:
-    """The limits of the control groups that hold the process, in bytes, version 2 and 1."""
+    """Memory limits, bytes, of the process's control groups and their parents, versions 1 and 2."""
     with suppress(OSError):
         for line in (root / "proc/self/cgroup").read_text().splitlines():
             _, kinds, path = line.split(":", 2)

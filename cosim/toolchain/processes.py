@@ -1,16 +1,16 @@
-"""Work in processes of their own, which may hang, crash or be spoilt without harm.
+"""Runs functions in worker processes, which may hang, crash or be spoilt without harm.
 
-A netlist can make ngspice, one library a process, loop for ever, end the process, or refuse all
-further work; and a process has one ngspice, which one thread can use. multiprocessing and pebble
-run the caller's program again, which standard input and a script without a main guard do not
-survive; pebble limits a call's whole time; loky loses all calls with one process. Here a process
-knows its function by its module, and work without progress ends it. No wall clock tells that: a
-machine that slept, or a process that was stopped, has lost nothing.
+A netlist can make ngspice loop for ever, end the process, or refuse all further work; and a process
+has only one ngspice, usable by one thread. multiprocessing and pebble run the caller's program
+again, which fails for standard input and for a script without a main guard; pebble limits a call's
+total time; loky loses all calls with one process. Here a worker imports its function by name, and
+is ended when it makes no progress. That is measured in CPU time and in time awake, not by the wall
+clock: a machine that slept, or a process that was stopped, has lost nothing.
 
-A process has a folder of its own to work in, and of the environment only what its libraries need;
-:class:`Bounds` close a fence around it. Those that are bounded alike are kept for further calls. In
-such a process a stranger's code may run and speak for it: what it says is JSON, never a pickle,
-which could call anything here.
+A worker has a working folder of its own, and only those environment variables that its libraries
+need; with :class:`Bounds` it runs in a fence. Workers of equal bounds are reused. Untrusted code
+may run in a bounded worker and answer in its name, so its messages are JSON, never a pickle, which
+could call anything here.
 """
 
 import builtins
@@ -43,33 +43,33 @@ from cosim.toolchain import fence
 from cosim.toolchain.interrupts import caught_signals
 
 PATIENCE = 30.0
-"""s of a process's own CPU time without any progress after which its simulation hangs."""
+"""s of a worker's CPU time without progress, after which its simulation counts as hanging."""
 
 STALLED = 300.0
-"""s in which this process was awake, and another one neither worked nor made progress, after which
-that one is given up. The machine may be the reason."""
+"""s of this process awake without progress or CPU time reported by a worker, after which the worker
+is given up. The machine may be the reason."""
 
 ENDING = 30.0
 """s that a process has to end once its pipe is closed."""
 
 TRIES = 3
-"""A process may die of something else than its call, such as a kill from outside."""
+"""Attempts to start a worker, which may be killed from outside before its call begins."""
 
 CALLS = 250
-"""After which a process is replaced: what ngspice leaks stays below some MB."""
+"""Calls after which a process is replaced: so ngspice's memory leaks stay below some MB."""
 
 MOST_SAID = 64 << 20
-"""Bytes that a bounded process may say at once: summaries are small, waveforms are in a file."""
+"""Most bytes of one message from a bounded process: waveforms are in a file, not in messages."""
 
 _PACKED = "__columns__"
-"""The one key of what stands for columns."""
+"""The only key of a JSON object that stands for columns in a file."""
 
 _REPORT_EVERY = 0.1  # s of wall time
 _BEAT = 1.0  # s between two reports of the CPU time used
-_MOST = 2.0  # s that count between two looks at a clock; whatever is more, one of them slept
+_MOST = 2.0  # s that count at most between two readings of a clock; a longer gap is sleep
 
 _KEPT = ("PATH", "LD_", "DYLD_", "PYTHON", "LANG", "LC_", "TZ", "SYSTEMROOT", "NGSPICE_LIBRARY")
-"""What the names of variables begin with that a process is given."""
+"""Beginnings of the names of environment variables that a process is given."""
 
 _PROGRAM = """
 import signal, sys
@@ -87,25 +87,25 @@ Progress = Callable[[float], None]
 
 
 class ProcessLost(SimulationFailed):
-    """A process has died or did nothing; its call need not be the reason."""
+    """A process has died or stalled; its call need not be the reason."""
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """What a process may reach beyond its libraries and its own folder."""
+    """A fenced process's access beyond its libraries and its own folder."""
 
     reads: tuple[str, ...] = ()
     """Paths of files and folders."""
     inside: Path | None = None
-    """Where its own folder lies: with the tapes of long runs. None: with the system's."""
+    """The parent of its own folder, which also holds tapes of long runs; None: the system's."""
     library: str = ""
-    """libngspice, which a process may not know where to find."""
+    """The path of libngspice, which a process may be unable to find."""
     first: Callable[[], object] | None = None
-    """What is called before the fence closes: it loads what reads more."""
+    """Called before the fence closes, to load libraries that read other files."""
 
 
 def processors() -> int:
-    """How many this process may use."""
+    """The number of processors that this process may use."""
     affinity = getattr(os, "sched_getaffinity", None)
     return len(affinity(0)) if affinity else os.cpu_count() or 1
 
@@ -113,7 +113,7 @@ def processors() -> int:
 class Worker:
     """A process that calls ``function(argument, progress)`` with one argument after another.
 
-    ``function`` must be importable, and travels once, as do the values that a partial binds. The
+    ``function`` must be importable. It is sent once, as are the values that a partial binds. The
     process ends with its parent.
     """
 
@@ -135,21 +135,22 @@ class Worker:
         held.append(self._process)
         self.given, self.usable = 0, False
         self.began = False
-        """It has said something of its call, so what ends it now is not its start."""
+        """Whether it has sent a message in this call; else its end is a failure to start."""
         self._rest()
         self._send([os.path.abspath(path) for path in sys.path])
         self._send(function)
         self._send(bounds)
 
     def call(self, argument: Any, progress: Progress, heed: Callable[[], None]) -> Any:
-        """What the function gives, while ``progress`` is told the time that it has reached and
-        ``heed`` may raise. Raises EOFError where the process has died; and what the function
-        raises: then, but for BadInput, and where it hangs, the process is not to be used again."""
+        """The function's result. Meanwhile ``progress`` is called with the simulated time reached,
+        and ``heed``, which may raise. Raises EOFError where the process has died, SimulationFailed
+        where it hangs, and the function's own exceptions. Unless the process has answered with a
+        result or BadInput, it is not ``usable`` again."""
         self.given, self.began, self.usable = self.given + 1, False, False
         self._steps = False
         said: tuple[str, Any] | None = None
         self.lost = True
-        """It has given its answer, but not come to an end after it."""
+        """Whether the process has not reported itself ready again after its answer."""
         self._rest()
         self._send(argument)
         while self._spent < PATIENCE and self._waited < STALLED:
@@ -162,7 +163,7 @@ class Worker:
                 continue
             try:
                 kind, value = self._heard()
-            except (OSError, EOFError) as error:  # whoever talks nonsense need not die of it
+            except (OSError, EOFError) as error:  # after a senseless message it may still be alive
                 self._process.kill()
                 if said is None:
                     raise EOFError from error
@@ -195,8 +196,8 @@ class Worker:
         )
 
     def _heard(self) -> tuple[str, Any]:
-        """What the process says: a kind, and what belongs to it. Raises EOFError where it has died,
-        OSError also where it makes no sense."""
+        """The next message: its kind and value. Raises EOFError where the process has died, OSError
+        also for a senseless message."""
         if self.kind[1] is None:
             return self.pipe.recv()
         try:
@@ -214,7 +215,7 @@ class Worker:
         self.reached = 0.0
         """The latest progress of the call at hand, s of simulated time."""
         self._spent = self._waited = 0.0
-        """s of its CPU time, and s of this process awake, since then."""
+        """s of its CPU time, and s of this process awake, since its last progress."""
         self.rested = time.monotonic()
 
     @property
@@ -227,8 +228,8 @@ class Worker:
         return self._process.poll() is None
 
     def end(self, patience: float = 0.0) -> str:
-        """How the process ended: the signal or exit code, and its last word; SIGKILL, after
-        ``patience`` s."""
+        """End the process, by SIGKILL after ``patience`` s, and tell how it ended: the signal or
+        exit code, and its last line on stderr."""
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(patience)
         self._process.kill()
@@ -242,30 +243,31 @@ class Worker:
         return how
 
     def _let_go(self) -> None:
-        """Close this process's ends of what leads to the other one."""
+        """Close this process's ends of the worker's stdin and pipe."""
         assert self._process.stdin is not None
         self._process.stdin.close()
         self.pipe.close()
 
     def _send(self, message: Any) -> None:
-        with suppress(OSError):  # of a process that has died: hear() tells it
+        with suppress(OSError):  # where the process has died, which ``_heard`` reports
             self.pipe.send(message)
 
 
 _living: dict[int, "ref[Worker]"] = {}
-"""By their ids: the callback of a WeakSet would lose an interrupt."""
+"""Workers by their ids. No WeakSet: an interrupt within its callback would be lost."""
 _idle: defaultdict[Any, "deque[Worker]"] = defaultdict(deque)
-"""Processes that wait for a call, by their function and bounds. What is taken out of a deque and
-then lost to an interrupt ends when Python frees it."""
+"""Processes that wait for a call, by their function and bounds. A worker that is taken out of a
+deque and then lost by an interrupt is ended when Python frees it."""
 
 _places = threading.BoundedSemaphore(processors())
-"""For processes at work. Signals are held back while one is taken, so that none is lost."""
+"""Permits for processes at work. Signals are held back while a permit is taken, so that it is given
+back."""
 
 _here = threading.local()
 
 
 def _forget() -> None:
-    """In a child of a fork: the processes are its parent's, and end with that one alone."""
+    """In a child of a fork: let go of the workers, which are its parent's."""
     global _places
     for each in list(_living.values()):
         with suppress(Exception):
@@ -281,8 +283,8 @@ if hasattr(os, "register_at_fork"):
 
 @contextmanager
 def in_place() -> Iterator[None]:
-    """Within this context what would be given to a process is done in this one: it is a worker
-    itself, or is to be measured or changed."""
+    """Within this context work for other processes is done in this one: because it is a worker
+    itself, or so that the work can be profiled or patched."""
     before, _here.ours = in_a_worker(), True
     try:
         yield
@@ -291,22 +293,22 @@ def in_place() -> Iterator[None]:
 
 
 def in_a_worker() -> bool:
-    """Whether this thread is to do itself what others give to a process."""
+    """Whether this thread does work itself instead of giving it to another process."""
     return getattr(_here, "ours", False)
 
 
 def _error(name: str, text: str) -> Exception:
-    """An error of a bounded process: one of ours or of Python's, by its name."""
+    """An exception of a bounded process: one of this package or of Python, by its name."""
     ours = (BadInput, Refused, SimulationFailed, StepTooSmall)
     kind: Any = (vars(builtins) | {one.__name__: one for one in ours}).get(name)
-    with suppress(TypeError):  # one that takes more than a text
+    with suppress(TypeError):  # no class, or an exception that takes more than a text
         if issubclass(kind, Exception):
             return kind(_printable(text))
     return RuntimeError(_printable(f"{name}: {text}"))
 
 
 def _printable(value: Any) -> Any:
-    """The same, all its texts printable."""
+    """The value with all texts in lists and objects made printable."""
     if isinstance(value, str):
         return printable(value)
     if isinstance(value, list):
@@ -323,21 +325,21 @@ def isolated(
     bounds: Bounds | None = None,
     lost: Callable[[str], None] = lambda _: None,
 ) -> Any:
-    """What ``function(argument, progress)`` gives, from another process: a fresh one, or, with
-    ``bounds``, one that is kept, and then what JSON can hold, and :class:`Packed` columns; no more
-    than there are processors at once.
+    """The result of ``function(argument, progress)`` in another process: a fresh one, or, with
+    ``bounds``, one that is reused, where the result must fit in JSON, :class:`Packed` columns
+    aside. At most as many processes as processors work at once.
 
     Any thread may call it. Raises what the function raises, or SimulationFailed where the process
-    hangs or dies; where it does so after its answer, ``lost`` is told how.
+    hangs or dies; if that happens after its answer, ``lost`` is called with how it ended.
     """
-    told: list[BaseException] = []
+    interrupts: list[BaseException] = []
     answer = None
 
     def heed() -> None:
-        if told:
-            raise told[0]
+        if interrupts:
+            raise interrupts[0]
 
-    with caught_signals(told.append), _place(heed):
+    with caught_signals(interrupts.append), _place(heed):
         for tried in range(TRIES):
             worker = _taken(function, bounds)
             try:
@@ -363,8 +365,8 @@ def isolated(
 
 @contextmanager
 def _place(heed: Callable[[], None]) -> Iterator[None]:
-    """The right to have a process at work, when one ends. Those that ``progress`` asks for have
-    that of the call which told it."""
+    """Wait for a permit to have a process at work. A call from within ``progress`` uses the permit
+    of the call that is in progress."""
     if getattr(_here, "at_work", False):
         yield
         return
@@ -379,7 +381,7 @@ def _place(heed: Callable[[], None]) -> Iterator[None]:
 
 
 def _taken(function: Callable[[Any, Progress], Any], bounds: Bounds | None) -> Worker:
-    """A process that waits and is still there, or a new one."""
+    """An idle process that is still alive, or a new one."""
     with suppress(IndexError):
         while bounds is not None:
             worker = _idle[function, bounds].pop()
@@ -390,7 +392,7 @@ def _taken(function: Callable[[Any, Progress], Any], bounds: Bounds | None) -> W
 
 
 def _thin_out() -> None:
-    """End those that have waited longest, beyond one for each processor."""
+    """End the idle processes that have waited longest, until one remains for each processor."""
     most = processors()
     while len(waiting := [one for each in list(_idle.values()) for one in list(each)]) > most:
         longest = min(waiting, key=lambda worker: worker.rested)
@@ -400,14 +402,15 @@ def _thin_out() -> None:
 
 
 def end_idle(inside: Path) -> None:
-    """End those that wait and have their folders there."""
+    """End the idle processes whose folders lie in ``inside``."""
     for (_, bounds), waiting in list(_idle.items()):
         while bounds.inside == inside and waiting:
             waiting.pop().end()
 
 
 def _clear(owner: int, processes: "list[subprocess.Popen[Any]]", folder: str) -> None:
-    """What is left of a worker that nobody has any more, or that this process leaves behind."""
+    """Kill and remove what is left of a worker, once it is freed or this process ends; a forked
+    child is not the ``owner`` and does nothing."""
     if os.getpid() != owner:
         return
     for process in processes:
@@ -418,29 +421,30 @@ def _clear(owner: int, processes: "list[subprocess.Popen[Any]]", folder: str) ->
 
 
 _SAID = "said"
-"""The file of a process's own folder that has what it said on stderr."""
+"""The file in a process's own folder with its output, stderr included."""
 
 
 def _start(pipe: Connection, folder: str, lock: int, library: str) -> "subprocess.Popen[Any]":
-    """A process that serves the other end of ``pipe``, and whose input ends with this process."""
+    """Start a process that serves ``pipe``, and whose stdin closes when this process ends."""
     handle = pipe.fileno()
-    # In the session of a terminal it could type into the shell there.
+    # A session of its own, as in a terminal's session it could type into the shell.
     options: dict[str, Any] = {"pass_fds": (handle, lock), "start_new_session": True}
     if sys.platform == "win32":
         os.set_handle_inheritable(handle, True)
         about = subprocess.STARTUPINFO(lpAttributeList={"handle_list": [handle]})
         options = {"startupinfo": about}
-    kept = {name: value for name, value in os.environ.items() if name.startswith(_KEPT)}
-    kept |= {"NGSPICE_LIBRARY_PATH": library} if library else {}
-    kept |= dict.fromkeys(("HOME", "TMPDIR", "TEMP"), folder) | {"OPENBLAS_NUM_THREADS": "1"}
+    environment = {name: value for name, value in os.environ.items() if name.startswith(_KEPT)}
+    environment |= {"NGSPICE_LIBRARY_PATH": library} if library else {}
+    environment |= dict.fromkeys(("HOME", "TMPDIR", "TEMP"), folder)
+    environment |= {"OPENBLAS_NUM_THREADS": "1"}
     command = [sys.executable, "-P", "-c", _PROGRAM, type(pipe).__name__, str(handle)]
-    options |= {"stdin": subprocess.PIPE, "cwd": folder, "env": kept}
+    options |= {"stdin": subprocess.PIPE, "cwd": folder, "env": environment}
     with open(os.path.join(folder, _SAID), "wb") as said:
         return subprocess.Popen(command, stdout=said, stderr=said, **options)
 
 
 def serve(pipe: Connection) -> None:
-    """What the process does until its parent ends: it calls the function, and tells."""
+    """The worker's main loop until its parent ends: call the function, and send the answers."""
     function, bounds = pipe.recv(), pipe.recv()
     unfit: Exception | None = None
     if bounds is not None:
@@ -475,11 +479,12 @@ def serve(pipe: Connection) -> None:
 
 
 used: "deque[Callable[[], object]]" = deque()
-"""What ends the use of something once a call is answered: a stranger's code may end the process."""
+"""Cleanup to be called after the answer to a call is sent: untrusted code may end the process in
+it."""
 
 
 def end_used() -> None:
-    """End the use of all that calls have left."""
+    """Call the cleanup that calls have left."""
     while used:
         used.popleft()()
 
@@ -488,13 +493,13 @@ _retires = False
 
 
 def retire() -> None:
-    """Have this process replaced after the call at hand: something is spoilt for good."""
+    """Have this process replaced after the current call, since its library is spoilt."""
     global _retires
     _retires = True
 
 
 class _Reports:
-    """Tells the parent of progress, and of the CPU time that was used without any."""
+    """Reports to the parent: progress, and the CPU time used since the last progress."""
 
     def __init__(self, tell: Callable[[tuple[str, Any]], None]) -> None:
         self._tell = tell
@@ -509,7 +514,7 @@ class _Reports:
             self._tell((kind, value))
 
     def begin(self) -> None:
-        """A call is at hand; its first progress is told at once."""
+        """A call begins; its first progress is sent at once."""
         self._told = -math.inf
         self.send("spent", 0.0)
         self.at_work.set()
@@ -547,5 +552,5 @@ def _packed(value: Any) -> dict[str, Any]:
 
 
 def _end_with_parent() -> None:
-    os.read(0, 1)  # whose other end closes however the parent ends
+    os.read(0, 1)  # stdin: its other end closes however the parent ends
     os._exit(1)
