@@ -1,8 +1,8 @@
 """The command V1(t) of a scene, at the power amplifier's input.
 
-All commands also stand behind the difference amplifier of the full circuit, whose netlist takes
-the voltages of the DAC and of the offset pin: V1 = GAIN (v_offset - v_dac). The offset pin is held
-where the highest command needs V_DAC = 0. In truth it is a PWM, of which ``v_offset`` is the mean.
+The netlist of the full circuit has a difference amplifier, V1 = GAIN (v_offset - v_dac), so each
+command also gives the voltages of the DAC and of the offset pin. The offset pin is set so that the
+highest command needs V_DAC = 0; it is in fact a PWM, with mean ``v_offset``.
 """
 
 from math import inf, nextafter
@@ -27,14 +27,15 @@ class Lagging(Command):
         if t < self._start:
             return level(self._start, 0.0, self.v_offset)
         piece = self._command.piece(self._own(t))
-        # Behind t, whatever rounding makes of the sum.
+        # Rounding of the sum must not put the ends at or before t.
         piece.until = max(piece.until + self._lag, nextafter(t, inf))
         piece.jump = max(piece.jump + self._lag, nextafter(t, inf))
         piece.origin += self._lag
         return piece
 
     def _own(self, t: float) -> float:
-        """The other command's time: on, before or after its corner as ``t`` is here."""
+        """The other command's time, t - lag, corrected for rounding: at, before or after its corner
+        exactly as ``t`` is to the corner delayed by the lag."""
         own = t - self._lag
         corner = self._command.piece(own - 1e-12 - 1e-15 * abs(t)).until
         edge = corner + self._lag
@@ -84,9 +85,8 @@ def _smooth(drive: Drive, amplitude: float, offset: float) -> Command:
 
 
 def corners(drive: Drive) -> Corners:
-    """Those of a shape of straight lines: a sawtooth is V1 = offset + amplitude (t/T - 1/2) on
-    [0, T), then a sharp fall; with a reset time the rise takes T less that, a linear fall the rest.
-    """
+    """The corners of a shape of straight lines. A sawtooth is V1 = offset + amplitude (t/T - 1/2)
+    on [0, T), then a jump; with a reset time it rises for T less that, then falls linearly."""
     if drive.table is not None:
         return held(drive.table) if drive.waveform == "steps" else drive.table
     if drive.waveform == "square":

@@ -22,8 +22,8 @@ class _Periodic(Command):
 
 
 Corners = Sequence[Sequence[float]]
-"""Phases of a period, which do not fall, from 0 to 1, and the levels there, as shares of the
-peak-to-peak voltage about the offset."""
+"""Pairs of phase, 0 to 1 and not falling, and level, as a share of the peak-to-peak voltage about
+the offset."""
 
 
 class Lines(_Periodic):
@@ -36,14 +36,15 @@ class Lines(_Periodic):
         super().__init__(frequency, amplitude, offset)
         (first, low), *_ = corners
         ends = pairwise([*corners, (1.0 + first, low)])
-        each = [(p, q - p, a, b) for (p, a), (q, b) in ends if q > p]
-        self._phases = [phase for phase, *_ in each]
+        # Lines of a period: phase at the start, length in phase, levels at start and end.
+        lines = [(p, q - p, a, b) for (p, a), (q, b) in ends if q > p]
+        self._phases = [phase for phase, *_ in lines]
         self._shape = [
             (span, offset + amplitude * (0.5 * (a + b)), amplitude * (b - a))
-            for _, span, a, b in each
+            for _, span, a, b in lines
         ]
-        after = [a for _, _, a, _ in each[1:] + each[:1]]
-        self._jumps = [amplitude * (b - a) != 0.0 for (*_, b), a in zip(each, after, strict=True)]
+        after = [a for _, _, a, _ in lines[1:] + lines[:1]]
+        self._jumps = [amplitude * (b - a) != 0.0 for (*_, b), a in zip(lines, after, strict=True)]
 
     def piece(self, t: float) -> Piece:
         number, count = self._number(t), len(self._phases)
@@ -83,7 +84,7 @@ class Lines(_Periodic):
         return (period + self._phases[place]) / self.frequency
 
     def _number(self, t: float) -> int:
-        """Of the last corner at or before ``t``, counted from the first one of the period 0."""
+        """The number of the last corner at or before ``t``, counted from period 0's first one."""
         period = edge_before(t, self.frequency)
         place = bisect_right(self._phases, t * self.frequency - period) - 1
         number = period * len(self._phases) + place
@@ -95,7 +96,7 @@ class Lines(_Periodic):
 
 
 def held(corners: Corners) -> Corners:
-    """Corners between which each level is held until the next."""
+    """Corners of steps: each level is held until the phase of the next corner."""
     ends = [*(phase for phase, _ in corners[1:]), 1.0 + corners[0][0]]
     return [
         corner

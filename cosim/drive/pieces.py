@@ -1,6 +1,6 @@
-"""A command is known by its pieces: V1 between two of its corners, in closed form.
+"""Commands consist of pieces: V1 between two corners in closed form.
 
-The one formula of a piece's value is in ``command.c``, which ngspice's callbacks call too.
+The formula of a piece's value is in ``command.c`` alone, which ngspice's callbacks call too.
 """
 
 from abc import ABC, abstractmethod
@@ -77,7 +77,7 @@ class Command(ABC):
     v_offset: float
     """Mean voltage of the offset pin, V."""
     period: float
-    """After which it repeats, s."""
+    """The period, s."""
 
     @abstractmethod
     def piece(self, t: float) -> Piece:
@@ -92,9 +92,9 @@ class Command(ABC):
         return self.piece(t).jump
 
     def lines(self, begin: float, end: float, most: int) -> tuple[Array, Array, Array] | None:
-        """The pieces from the corner ``begin`` until ``end`` (s) is reached, at most ``most`` of
-        them: their corners, one more than pieces, and V1 (V) where each begins and ends. None where
-        :meth:`piece` must be asked for one after the other."""
+        """The straight pieces from the corner ``begin`` until ``end`` (s) is reached, at most
+        ``most``: their corners (one more than pieces), and V1 (V) at the start and at the end of
+        each. None where :meth:`piece` must be called one by one."""
         return None
 
     def pieces(self, begin: float, end: float, most: int | None = None) -> list[Piece]:
@@ -120,14 +120,14 @@ class Command(ABC):
         at = np.ascontiguousarray(times, np.float64)
         values = np.empty_like(at)
         if at.size:
-            before = at[0] - earlier
+            before = at[0] - earlier  # a left limit may lie in the piece before
             pieces = self.pieces(float(before), float(at[-1])) if earlier else self._at(at)
             row = (Piece * len(pieces))(*pieces)
             formula(row, at.size, at.ctypes.data, values.ctypes.data)
         return values
 
     def _at(self, times: Array) -> list[Piece]:
-        """Those that hold at one of ``times``."""
+        """The pieces in which one of ``times`` lies."""
         pieces: list[Piece] = []
         done = 0
         while done < times.size:
@@ -137,8 +137,8 @@ class Command(ABC):
 
 
 class Ahead:
-    """The pieces of a command until ``duration`` (s) that compiled code has at hand, in ``drive``,
-    the structure ``Pieces`` of ``command.h``; ``reached`` tells how far the run is, s."""
+    """Prepares a command's pieces until ``duration`` (s) for compiled code, in ``drive``, the
+    structure ``Pieces`` of ``command.h``; ``reached`` gives the run's present time, s."""
 
     def __init__(
         self, drive: Any, command: Command, duration: float, reached: Callable[[], float]
@@ -159,7 +159,7 @@ class Ahead:
 
 def edge_before(t: float, rate: float) -> int:
     """The n of the last edge ``n / rate`` (as a float) at or before ``t``."""
-    n = floor(t * rate)
+    n = floor(t * rate)  # which rounding may put off by one
     if (n + 1) / rate <= t:
         return n + 1
     return n - 1 if n / rate > t else n

@@ -24,7 +24,7 @@ class Staircase(Command):
         self.v_offset = v_offset
         self._rate = rate
         self.period = len(codes) / rate
-        self._edges = [k for k in range(len(codes)) if codes[k] != codes[k - 1]]
+        self._edges = [k for k in range(len(codes)) if codes[k] != codes[k - 1]]  # periodic
 
     def piece(self, t: float) -> Piece:
         count = len(self.codes)
@@ -55,12 +55,12 @@ class Staircase(Command):
 
 
 class WithPwm(Command):
-    """Another command, with the offset pin as its PWM: 0 or 3.3 V, its duty the mean's share.
+    """Another command, with the offset pin as a PWM: 0 or 3.3 V, with the duty that gives its mean.
 
-    Its period is the command's, which holds no whole number of pulses. Times count from the middle
-    of a pulse, which is where the filter behind the pin, settled at the mean, has its mean; how the
-    real PWM lies to the sawtooth is left to chance. Before 0 there is the mean itself, so that all
-    begins settled. Edges within a nanosecond of a jump of the command are moved onto it.
+    ``period`` is that of the command, although it holds no whole number of pulses. Time 0 is the
+    middle of a pulse, where the settled filter behind the pin passes its mean; the real PWM's phase
+    to the sawtooth is random. Before 0 the pin has its mean, so that a run begins settled. An edge
+    within a nanosecond of a jump of the command is moved onto it.
     """
 
     _SAME = 1e-9  # s
@@ -71,7 +71,7 @@ class WithPwm(Command):
         self.period = command.period
         duty = command.v_offset / V_REFERENCE
         self._half = 0.5 * duty
-        self._still = not 1e-5 < duty < 1 - 1e-5  # pulses or gaps not wider than _SAME
+        self._still = not 1e-5 < duty < 1 - 1e-5  # pulses or gaps too short to matter, 20 ns
 
     def piece(self, t: float) -> Piece:
         piece = self._command.piece(t)

@@ -1,8 +1,8 @@
-"""Commands as straight lines: what a participant takes whose inputs are linear over a step.
+"""Commands as straight lines ("straights"), for participants with inputs linear over a step.
 
-A sine's straights end a little outside of it, so that each has the sine's own mean: with N of them
-a period a chord's mean is too small by (π/N)²/3 of itself, and all that the machine makes of the
-command would be. What is left is the shape within a straight, at most (π/N)²/3 of the amplitude.
+The ends of a sine's straights lie slightly outside of the sine, so that each straight has the
+sine's mean. With N per period the mean of a chord would be too small by a share (π/N)²/3, and so
+would the machine's response. The error left within a straight is at most (π/N)²/3 of the amplitude.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,18 +14,18 @@ from cosim.arrays import Array
 from cosim.drive.pieces import SINE, Command, Piece
 
 _CHORDS = 4000
-"""Straights a period of a sine: within 2.1e-7 of half its peak-to-peak voltage."""
+"""Straights per period of a sine: within 2.1e-7 of half its peak-to-peak voltage."""
 
 _TOGETHER = 4096
-"""How many straights are prepared at a time; of a sine those of a period."""
+"""Straights that are prepared at a time; for a sine, those of one period."""
 
 
 def straights(
     commands: Sequence[Command], duration: float, chords: int = _CHORDS
 ) -> Iterator[tuple[Array, Array, Array]]:
-    """Times (s), the first one where the last ones ended, and V1 (V, a column a command) at the
-    start and the end of each interval between two of them, until ``duration``, block after block.
-    The commands are of one shape; of a sine there are ``chords`` a period."""
+    """Blocks of straights until ``duration`` (s): times (s) at their ends, beginning with the last
+    time of the block before, and V1 (V, a column per command) at the start and end of each. The
+    commands have the same shape; a sine has ``chords`` straights per period."""
     if len(commands) == 1 and commands[0].lines(0.0, duration, 1):
         yield from _lines(commands[0], duration)
         return
@@ -54,7 +54,7 @@ def straights(
 
 
 def _lines(command: Command, duration: float) -> Iterator[tuple[Array, Array, Array]]:
-    """The straights of a command that knows them at once."""
+    """The straights of a command that lists them by ``Command.lines``."""
     begin = 0.0
     while begin < duration and (found := command.lines(begin, duration, _TOGETHER)):
         corners, start, end = found
@@ -69,7 +69,7 @@ def _lines(command: Command, duration: float) -> Iterator[tuple[Array, Array, Ar
 
 
 def straight(piece: Piece, begin: float) -> tuple[float, float, float]:
-    """Where the straight that starts at ``begin`` (s) ends, s, and V1 at both its ends, V."""
+    """The end (s) of the straight that starts at ``begin`` (s), and V1 (V) at its start and end."""
     if piece.kind != SINE:
         return piece.until, piece.value(begin), piece.before(piece.until)
     stop = min(piece.until, begin + 1.0 / _CHORDS / piece.rate)
@@ -78,18 +78,18 @@ def straight(piece: Piece, begin: float) -> tuple[float, float, float]:
 
 
 def _times(rate: float, begin: float, stop: float) -> Array:
-    """Where straights, ``rate`` a second, meet from ``begin`` to ``stop``, s; the last differs."""
+    """Ends of straights, ``rate`` per second, from ``begin`` to ``stop`` (s), where the last ends."""
     step = 1.0 / rate
     count = max(1, ceil((stop - begin) / step - 1e-6))
     return np.append(begin + step * np.arange(count), stop)
 
 
 def _on_straights(piece: Piece, times: Array, chords: int) -> Array:
-    """V1 (V) on the straights of one piece, of a sine ``chords`` a period, where they meet, at
-    ``times`` (s); at the last one the left limit."""
+    """V1 (V) at the ends ``times`` (s) of the straights of a piece, for a sine ``chords`` per
+    period; at the last time the left limit."""
     values = np.append(piece.values(times[:-1]), piece.before(float(times[-1])))
     if piece.kind == SINE:
-        # The straights' deviation from the mean of the sine where they meet, over the sine's own.
+        # The factor on the sine's deviation from its offset by which straights keep its mean.
         outside = tan(pi / chords) / (pi / chords)
         values = piece.offset + outside * (values - piece.offset)
     return values

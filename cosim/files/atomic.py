@@ -20,10 +20,10 @@ except ImportError:  # Windows
     fcntl = None
 
 _YOUNG = 60.0
-"""s that what is temporary stays although nobody has locked it: somebody may be about to."""
+"""s for which unlocked temporary files and folders stay: a process may be about to lock them."""
 
 _PREFIX = ".cosim-"
-"""Of what takes the place of a file later: a kill leaves it, and :func:`tidy` finds it."""
+"""Prefix of temporary files and folders, by which :func:`tidy` finds those of killed processes."""
 
 
 @contextmanager
@@ -35,14 +35,14 @@ def whole(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def together(paths: Sequence[Path], outdated: Sequence[Path] = ()) -> Iterator[list[Path]]:
-    """Temporary paths beside ``paths`` that take their places, one right after the other, when the
-    block ends well; what is ``outdated`` by them goes right before. Raises BadInput where one
-    cannot be written, or is a directory, a device or a pipe."""
+    """Temporary paths beside ``paths`` that replace these, one right after the other, when the
+    block ends without an exception; files ``outdated`` by them are removed right before. Raises
+    BadInput where a path cannot be written, or is a directory, a device or a pipe."""
     name = paths[0]
     try:
         for name in (*outdated, *paths):
             with suppress(FileNotFoundError, NotADirectoryError):
-                mode = name.stat().st_mode  # of what a link names: root could replace it in /dev
+                mode = name.stat().st_mode  # of a link's target: root could replace a device
                 if not stat.S_ISREG(mode):
                     kind = "a directory, not a file" if stat.S_ISDIR(mode) else "not a regular file"
                     raise BadInput(f"{plain(name)}: this is {kind}.")
@@ -56,7 +56,7 @@ def together(paths: Sequence[Path], outdated: Sequence[Path] = ()) -> Iterator[l
             yield [temporary for temporary, _ in pairs]
             for temporary, path in pairs:
                 name = path
-                # Else, after a loss of power, the name may be there and its content not.
+                # Without it a loss of power may leave the new name with no content.
                 with open(temporary, "rb+") as file:
                     os.fsync(file.fileno())
             for name in outdated:
@@ -64,7 +64,7 @@ def together(paths: Sequence[Path], outdated: Sequence[Path] = ()) -> Iterator[l
             for temporary, path in pairs:
                 name = path
                 os.replace(temporary, path)
-    except FileExistsError as error:  # of the folder: the files have names of their own
+    except FileExistsError as error:  # from mkdir: temporary names are unique
         raise BadInput(f"{plain(name.parent)}: this is a file, not a directory.") from error
     except OSError as error:
         raise BadInput(f"{plain(name)}: cannot be written ({error.strerror}).") from error
@@ -82,8 +82,8 @@ def write_all(files: Mapping[Path, bytes]) -> None:
 
 
 def locked(handle: int) -> bool:
-    """Whether an open file or folder is this process's own until it is closed: nobody else has
-    locked it, or nobody can, on a file system without locks."""
+    """Lock an open file or folder until it is closed. False where another process has locked it;
+    True also on a file system without locks."""
     try:
         if fcntl is not None:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -96,7 +96,7 @@ def locked(handle: int) -> bool:
 
 @contextmanager
 def _temporary(path: Path) -> Iterator[Path]:
-    """A new file beside ``path``, locked while this process has it at hand."""
+    """A new file beside ``path``, locked within this context and removed at its end."""
     temporary = path.with_name(f"{_PREFIX}{uuid4().hex}{path.suffix}")
     handle = os.open(
         temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666
@@ -114,8 +114,8 @@ def _temporary(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def alone(folder: Path) -> Iterator[None]:
-    """Let no other process write into ``folder`` that asks in the same way, and remove what killed
-    ones have left there. Raises BadInput where another one is at work."""
+    """Lock ``folder`` against other processes that call this, and remove what killed processes have
+    left there. Raises BadInput where another process has locked it."""
     if fcntl is None:
         yield
         return

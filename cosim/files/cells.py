@@ -1,9 +1,9 @@
-"""The one reader of tables: cells between commas, semicolons or tabs, and strict numbers; and of a
-quantity over time, from two columns of one.
+"""The reader of all tables (cells between commas, semicolons or tabs, strict numbers), and of a
+quantity over time from two columns of a table.
 
-Nothing is guessed that could turn one number into another: a decimal comma is one only where commas
-do not part the cells, and not beside decimal points; a row has as many cells as its header; a
-quotation mark encloses a whole cell, in one line.
+It is strict so that no number is read as another one: a comma is decimal only where commas do not
+separate cells, and a file has no decimal points beside it; a row has as many cells as its header;
+quotation marks enclose a whole cell, within one line.
 """
 
 import re
@@ -22,12 +22,12 @@ LARGEST = 50_000_000
 """Bytes of a table."""
 MOST_ROWS = 2_000_000
 MOST_CELLS = 10_000
-"""In a row."""
+"""Cells in a row."""
 
-_TOLD = 10_000  # rows between two words on how far it is
+_TOLD = 10_000  # rows between two reports of progress
 
 _CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029]")
-_DIGITS = r"[+-]?(?:[0-9]++{0}?[0-9]*+|{0}[0-9]++)(?:[eE][+-]?[0-9]++)?"
+_DIGITS = r"[+-]?(?:[0-9]++{0}?[0-9]*+|{0}[0-9]++)(?:[eE][+-]?[0-9]++)?"  # {0}: decimal sign
 _NUMBER = {sign: re.compile(_DIGITS.format(re.escape(sign))) for sign in ".,"}
 _QUOTED = re.compile(r' *"((?:[^"]|"")*+)" *')
 
@@ -92,10 +92,10 @@ class Cells:
         """Note a decimal sign: a file has only one."""
         self._signs.setdefault(sign, (line, column))
         if len(self._signs) == 2:
-            (one, first), (other, second) = (self._signs[sign] for sign in ".,")
+            (row, first), (comma_row, second) = (self._signs[sign] for sign in ".,")
             raise BadInput(
-                f"{self.name}: row {one}, column {plain(first, 40)} has a decimal point, and row "
-                f"{other}, column {plain(second, 40)} a decimal comma."
+                f"{self.name}: row {row}, column {plain(first, 40)} has a decimal point, and row "
+                f"{comma_row}, column {plain(second, 40)} a decimal comma."
             )
 
     def _refuse(self, line: int, column: str, text: str, words: str) -> NoReturn:
@@ -133,7 +133,7 @@ def read_cells(path: Path) -> Cells:
 
 
 def _decoded(data: bytes) -> str:
-    """The text; what is no UTF-8 becomes U+FFFD, which is no number."""
+    """The text; bytes that are no UTF-8 become U+FFFD, which is no number."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         return data.decode("utf-16", errors="replace")
     return data.decode("utf-8-sig", errors="replace")
@@ -159,15 +159,16 @@ def _cells(line: str, separator: str, name: str, row: int) -> Iterator[str]:
 
 
 def _width(row: list[str]) -> int:
-    """Its cells, without empty ones at the end."""
+    """The number of cells, without empty ones at the end."""
     return max((place for place, cell in enumerate(row, 1) if cell), default=0)
 
 
 def read_timetable(path: Path, time: tuple[str, ...], value: tuple[str, ...]) -> Array | None:
     """The two columns as rows of (time, value); None where the header does not have them.
 
-    ``time`` and ``value`` are names that each column may have; others do not matter. Two rows or
-    more, finite; the time does not fall: where it is given twice the value jumps. Raises BadInput.
+    ``time`` and ``value`` are the names that the columns may have; other columns are ignored. There
+    are two rows or more of finite numbers; the time does not fall, and the value jumps where a time
+    is given twice. Raises BadInput.
     """
     cells = read_cells(path)
     columns = [k for names in (time, value) if (k := _place(cells, names)) is not None]
@@ -186,7 +187,7 @@ def read_timetable(path: Path, time: tuple[str, ...], value: tuple[str, ...]) ->
 
 
 def _place(cells: Cells, names: tuple[str, ...]) -> int | None:
-    """Where the one column with one of these names stands."""
+    """The index of the column that has one of these names; None without one."""
     line, header = cells.rows[0]
     found = [place for place, cell in enumerate(header) if cell in names]
     if len(found) > 1:

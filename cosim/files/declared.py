@@ -1,4 +1,4 @@
-"""What the modules of a package declare, so that a new file is all that an addition takes."""
+"""Finds the modules of a package, so that a new file alone registers an addition."""
 
 from importlib import import_module
 from pkgutil import iter_modules

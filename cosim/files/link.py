@@ -1,6 +1,6 @@
 """A setting as a link: ``#scene=NAME&table.key=value&…``, the fragment of an address.
 
-It may come from a stranger: what its names and values may be is for who opens it to judge.
+It may come from a stranger: the code that opens it must check its names and values.
 """
 
 from collections.abc import Iterable

@@ -1,7 +1,7 @@
 """The safe reader of every file that a scene, a command or another file names.
 
-It reads regular files only, of a size that memory holds: a device or a pipe would never end, and
-some do something when they are merely opened. Who watches is told how far long reading is.
+It reads regular files of limited size only: devices and pipes may never end, and some act when they
+are merely opened. A watcher, if set, is told the progress of long reading.
 """
 
 import os
@@ -23,15 +23,15 @@ _watcher: ContextVar[Watcher | None] = ContextVar("watcher", default=None)
 
 
 class Refused(BadInput):
-    """A file does not pass; its cause is the system's error."""
+    """A file that cannot be read; ``__cause__`` is the system's error, if any."""
 
     why = ""
-    """What is wrong with it, as the end of a sentence."""
+    """The reason, as the end of a sentence."""
 
 
 @contextmanager
 def watched(watcher: Watcher) -> Iterator[None]:
-    """Within this context ``watcher`` is told each file at work, and which share of it is done."""
+    """Within this context ``watcher`` is called with each file being read, and the share done."""
     token = _watcher.set(watcher)
     try:
         yield
@@ -40,7 +40,7 @@ def watched(watcher: Watcher) -> Iterator[None]:
 
 
 def tell(path: Path | str, share: float) -> None:
-    """Tell who watches how much of the file is done, from 0 to 1."""
+    """Tell the watcher which share of the file is done, 0 to 1."""
     watcher = _watcher.get()
     if watcher is not None:
         watcher(str(path), share)
@@ -53,7 +53,7 @@ def read(path: Path | str, most: int) -> bytes:
         size = os.fstat(file.fileno()).st_size
         while chunk := file.read(_CHUNK):
             read.write(chunk)
-            _check_size(path, read.tell(), most)  # it grows, or its size is not told
+            _check_size(path, read.tell(), most)  # the file may grow, or have no known size
             if size > _CHUNK:
                 tell(path, 0.5 * min(1.0, read.tell() / size))
         return read.getvalue()
@@ -69,7 +69,7 @@ def opened(path: Path | str, most: int) -> Iterator[IO[bytes]]:
         _check(path, os.stat(path), most)
         file = open(os.open(path, flags), "rb")  # noqa: SIM115
         with file:
-            _check(path, os.fstat(file.fileno()), most)  # another one may have taken its place
+            _check(path, os.fstat(file.fileno()), most)  # it may have been replaced meanwhile
             yield file
     except OSError as error:
         raise _refused(path, error.strerror or str(error)) from error

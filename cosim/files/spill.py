@@ -27,15 +27,14 @@ BLOCK = 1 << 16
 """Rows that are processed at a time where not all of them need to be in memory."""
 
 _mapped: dict[int, "ref[mmap.mmap]"] = {}
-"""By their ids. No WeakSet: an interrupt that comes while a file is unmapped would be raised in its
-callback, where Python loses it."""
+"""Mapped files by their ids. No WeakSet: an interrupt within its callback would be lost."""
 
 _folder: ContextVar[Path | None] = ContextVar("folder", default=None)
 
 
 @contextmanager
 def on_disk_in(folder: Path) -> Iterator[None]:
-    """Tapes that outgrow memory within this context lie in ``folder``, not in the system's own."""
+    """Within this context tapes that outgrow memory lie in ``folder``, not the system's own."""
     token = _folder.set(folder)
     try:
         yield
@@ -49,14 +48,14 @@ def place() -> Path | None:
 
 
 class Packed:
-    """Columns of equal length, on their way to another process in a file of this one's working
-    folder, whichever a stranger's code works in by now. Raises BadInput where the disk is full."""
+    """Columns of equal length, written to a temporary file for another process: in TMPDIR, whatever
+    folder untrusted code has changed to. Raises BadInput where the disk is full."""
 
     def __init__(self, columns: Mapping[str, Array]) -> None:
         rows = len(next(iter(columns.values())))
         handle, path = tempfile.mkstemp()
         self.told = os.path.basename(path), tuple(columns), rows
-        """What :func:`unpacked` is to be given."""
+        """Arguments for :func:`unpacked` after the folder."""
         with open(handle, "wb", buffering=0) as file:
             for values in columns.values():
                 for part in blocks(rows):
@@ -64,9 +63,9 @@ class Packed:
 
 
 def unpacked(folder: str, name: str, names: Sequence[str], rows: int) -> dict[str, Array]:
-    """The columns of these ``names`` that lie in a file of ``folder``, mapped; the file is gone.
-    Who tells of it may be a stranger's code: raises ValueError, TypeError and OSError where
-    anything else stands there than that."""
+    """Map the columns ``names`` of a file in ``folder``, and unlink it. The arguments may come from
+    untrusted code: raises ValueError, TypeError and OSError where they or the file are not as
+    :class:`Packed` makes them."""
     if os.path.basename(name) != name or not all(isinstance(each, str) for each in names):
         raise ValueError(name)
     path = os.path.join(folder, name)
@@ -83,7 +82,8 @@ def unpacked(folder: str, name: str, names: Sequence[str], rows: int) -> dict[st
 
 
 class Tape:
-    """Rows of ``columns`` numbers, written once, then read as an array; about ``rows``, if known.
+    """Rows of ``columns`` numbers, appended, then read as an array. ``rows`` is about their number,
+    if known.
 
     Raises BadInput where the disk is full.
     """
@@ -157,7 +157,7 @@ def _no_room(error: OSError) -> BadInput:
 
 
 def blocks(count: int, most: int = BLOCK) -> Iterator[slice]:
-    """Slices of ``most`` rows, ``count`` in all; after each the tapes' pages leave the memory."""
+    """Slices of at most ``most`` of ``count`` rows; after each, tapes' pages leave the memory."""
     for start in range(0, count, most):
         yield slice(start, min(start + most, count))
         release()

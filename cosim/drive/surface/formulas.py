@@ -44,7 +44,7 @@ class Transport:
     gravity: float = GRAVITY
 
     def coefficients(self) -> Friction:
-        """Those of :func:`horizontal_equivalent`; BadInput where there is no such transport."""
+        """The pair of :func:`horizontal_equivalent`; BadInput where no transport is possible."""
         mu_s, mu_k, a_max, f_n = self.mu_s, self.mu_k, self.a_max, self.f_n
         _friction(mu_s, mu_k)
         positive(a_max=a_max, f_n=f_n, period=self.period, gravity=self.gravity)
@@ -124,7 +124,7 @@ def least_peak_acceleration_at_any_force(gravity: float = GRAVITY) -> float:
 def conditions(
     mu_s: float, mu_k: float, a_max: float, f_n: float, gravity: float = GRAVITY
 ) -> dict[str, bool]:
-    """Which conditions for transport upwards are fulfilled; those for the robust variant too."""
+    """Whether each condition for transport upwards, and for its robust variant, is fulfilled."""
     _friction(mu_s, mu_k)
     positive(a_max=a_max, f_n=f_n, gravity=gravity)
     loose = a_max > least_peak_acceleration(mu_s, f_n, gravity)
@@ -224,7 +224,7 @@ def _friction(mu_s: float, mu_k: float) -> None:
 
 
 def positive(**values: float) -> None:
-    """BadInput unless all these are above 0, and within what can be computed with."""
+    """Raise BadInput unless all values are positive, and from LEAST to GREATEST."""
     for name, value in values.items():
         if not LEAST <= value <= GREATEST:
             raise BadInput(f"{name} = {value:g} must be above 0, from {LEAST:g} to {GREATEST:g}.")

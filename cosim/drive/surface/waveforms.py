@@ -45,7 +45,7 @@ class Cycle:
     def stroke(self) -> float:
         """The height between the surface's lowest and highest point, m."""
         times, velocities = self.knots()
-        turns = times[:-1] - velocities[:-1] / np.asarray(self.accelerations)
+        turns = times[:-1] - velocities[:-1] / np.asarray(self.accelerations)  # velocity 0
         inside = turns[(turns > times[:-1]) & (turns < times[1:])]
         return float(np.ptp(self.position(np.concatenate([times, inside]))))
 
@@ -53,7 +53,7 @@ class Cycle:
         """Times, s, and velocities, m/s, between which the velocity is linear; one period."""
         times = np.array(self.times)
         change = np.cumsum(np.asarray(self.accelerations) * np.diff(times))
-        change[-1] = 0.0  # but for rounding it is that already
+        change[-1] = 0.0  # removes rounding: a cycle returns to its velocity
         return times, self.start_velocity + np.concatenate([[0.0], change])
 
 
