@@ -1,5 +1,5 @@
-"""What a command is, how its options become those of a parser, and what commands share: the folder
-to write into, and the progress bar."""
+"""Declaration of commands, their parsers, and what commands share: the folder to write into, and
+the progress bar."""
 
 import sys
 from argparse import ArgumentParser, Namespace
@@ -26,41 +26,41 @@ class Command:
     name: str
     help: str
     run: Callable[..., int | None] | None = None
-    """Does it, with what was given for its options; returns the exit code, None for 0. Raises
-    CosimError."""
+    """Runs the command with the values of the options that were given; returns the exit code, None
+    for 0. Raises CosimError."""
     options: Sequence[Option] | Callable[[], Sequence[Option]] = ()
     out: str = ""
-    """Where it writes unless ``out`` is given; empty for a command that writes nothing."""
+    """Default of --out; empty for a command without this option."""
     commands: Sequence["Command"] = ()
 
     def call(self, arguments: Namespace) -> int | None:
-        """Do what was parsed; what was not given is left to ``run``."""
+        """Run the command; options that were not given take the defaults of ``run``."""
         given = {name: value for name, value in vars(arguments).items() if name != "call"}
         assert self.run is not None
-        return self.run(**{name: x for name, x in given.items() if x is not None and x != []})
+        return self.run(**{name: v for name, v in given.items() if v is not None and v != []})
 
 
 def add_commands(
     parser: ArgumentParser, commands: Iterable[Command], asked: Collection[str] | None, metavar: str
 ) -> None:
-    """Let ``parser`` take one of the commands; what was parsed then has its ``call``.
+    """Add the commands to ``parser``; the parsed namespace has the chosen one's ``call``.
 
-    Only those among ``asked`` get their options, as to find them takes time; None: all.
+    Options are added only to commands among ``asked`` (None: all), since finding them takes time.
     """
     own = parser.add_subparsers(required=True, metavar=metavar)
     for command in commands:
-        one = own.add_parser(command.name, help=command.help, allow_abbrev=False)
-        one.description = command.help
-        one.set_defaults(call=command.call)
+        subparser = own.add_parser(command.name, help=command.help, allow_abbrev=False)
+        subparser.description = command.help
+        subparser.set_defaults(call=command.call)
         if asked is None or command.name in asked:
-            add_options(one, command)
+            add_options(subparser, command)
             if command.commands:
                 names = "|".join(each.name for each in command.commands)
-                add_commands(one, command.commands, asked, names)
+                add_commands(subparser, command.commands, asked, names)
 
 
 def _written(suffix: str, text: str) -> Path:
-    """The path of a folder to write, or of a file, whose name tells what it is."""
+    """The argument of --out as a path: of a folder, or of a file with the ``suffix``."""
     if not text and not suffix:
         raise BadInput('--out "": must name a folder (. is the one you are in).')
     if suffix and Path(text).suffix.lower() != suffix:
@@ -69,7 +69,7 @@ def _written(suffix: str, text: str) -> Path:
 
 
 def add_options(parser: ArgumentParser, command: Command) -> None:
-    """Let ``parser`` take the options of a command."""
+    """Add the options of a command to ``parser``."""
     options = [*(command.options() if callable(command.options) else command.options)]
     if command.out:
         options.append(Option("--out", "where to write", "DIR", Path, command.out))
@@ -95,10 +95,10 @@ def add_options(parser: ArgumentParser, command: Command) -> None:
 
 @contextmanager
 def writable(folder: Path, shared: bool = False) -> Iterator[None]:
-    """Refuse a folder that cannot be written to before a long run, not after it, and one into which
-    another command writes, unless what is written there has names of its own (``shared``).
+    """Refuse, before a long run, a folder that cannot be written to, or into which another command
+    is writing; the latter is allowed if ``shared``, where each command writes other files.
 
-    Folders that were made for a run that then fails go again, unless something is in them.
+    Folders that were made for a run that then fails are removed if they are empty.
     """
     made: list[Path] = []
     try:

@@ -29,7 +29,7 @@ INTERRUPTED = 130
 
 _NO_MEMORY = "The memory ran out: try fewer --workers, or a longer run.output_step"
 _NO_THREADS = "The system allows no more threads: try --workers 1"
-_NO_THREAD = "start new thread"  # in Python's words
+_NO_THREAD = "start new thread"  # in Python's message
 _NO_ROOM = re.compile(
     "failed to map|cannot allocate|bad_alloc|without setting an exception", re.IGNORECASE
 )
@@ -51,10 +51,10 @@ class _Parser(argparse.ArgumentParser):
         raise BadInput(f"{message} (see {self.prog} --help).")
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:  # pyright: ignore
-        """As it is, but what is not known is told by the command that does not know it."""
+        """As argparse does, but unknown options are refused by the subcommand's own parser."""
         found, others = super().parse_known_args(args, namespace)
         if others:
-            # All options begin alike, so these must be nearer than names for a suggestion are.
+            # All options begin with "--", so they count as near only above 0.8, not 0.6.
             from difflib import get_close_matches
 
             near = get_close_matches(others[0], self._option_string_actions, 1, 0.8)
@@ -77,7 +77,7 @@ def _parser(arguments: list[str] | None) -> argparse.ArgumentParser:
 
 
 def _completion(shell: str) -> None:
-    """Print the shell's program; a scene's name and the names of files are completed, too."""
+    """Print the shell's program, which also completes names of scenes and of files."""
     import shtab
 
     from cosim.scene import list_scenes
@@ -101,8 +101,8 @@ def _actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
     for action in parser._actions:
         yield action
         if isinstance(action, argparse._SubParsersAction):
-            for one in action.choices.values():
-                yield from _actions(one)
+            for subparser in action.choices.values():
+                yield from _actions(subparser)
 
 
 _COMPLETION = Command(
@@ -116,8 +116,8 @@ _COMPLETION = Command(
 def main(argv: list[str] | None = None) -> int:
     """Run the command; returns the exit code."""
     _open_standard_streams()
-    gc.set_threshold(50_000)  # by default it takes a twentieth of a large sweep's time
-    # Nothing here gains by BLAS's threads, and where one cannot be made it sends itself SIGINT.
+    gc.set_threshold(50_000)  # with the default it takes a twentieth of a large sweep's time
+    # Threads of BLAS bring nothing here, and where none can be started it raises SIGINT.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # prints ? for what the encoding lacks
@@ -135,7 +135,7 @@ def main(argv: list[str] | None = None) -> int:
     except CosimError as error:
         return _told(str(error), error.exit_code)
     except (MemoryError, ImportError, SystemError) as error:
-        # A library that finds no room is not loaded, and Python may lose the reason.
+        # Without memory a library is not loaded, and Python's error may name another reason.
         if not isinstance(error, MemoryError) and not _NO_ROOM.search(str(error)):
             raise
         return _told(_NO_MEMORY, SimulationFailed.exit_code)
@@ -161,8 +161,8 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _open_standard_streams() -> None:
-    """Let nothing be where the caller has closed a stream: the next file that is opened would take
-    its number, and be written to with what is printed."""
+    """Open /dev/null for each standard stream that the caller has closed: else the next opened file
+    would get its number, and printed text would be written into it."""
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:
             os.fstat(number)
@@ -208,7 +208,7 @@ def _note(message: Warning | str, *_: object, **__: object) -> None:
 def _told(sentence: str, code: int) -> int:
     """Print the sentence on one line; returns the exit code."""
     words = printable(" ".join(sentence.split()))
-    if len(words) > _LONGEST:  # of what was given, not of what is said of it
+    if len(words) > _LONGEST:  # cut the middle, which quotes the input
         words = f"{words[: _LONGEST // 2]} … {words[-_LONGEST // 2 :]}"
     print(f"cosim: {words}" + ("" if words.endswith((".", "?")) else "."), file=sys.stderr)
     return code

@@ -8,7 +8,7 @@ from cosim.studies.study import Option
 _KINDS = ("machine", "circuit", "fmu")
 _SCHEMA = "scene.schema.json"
 _TITLE = b'"Scene of cosim"'
-"""What tells it from another file of that name."""
+"""Text by which a schema written here is told from another file of that name."""
 
 
 def _new(file: Path, kind: str = "machine", base: str | None = None) -> None:

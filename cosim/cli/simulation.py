@@ -1,4 +1,4 @@
-"""The commands that simulate a scene and show what it does, and what goes with that."""
+"""The commands that simulate, list, show and export scenes and runs, and write FMUs."""
 
 import json
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""The commands that studies are."""
+"""The commands that run studies."""
 
 import sys
 from contextlib import nullcontext
@@ -12,11 +12,11 @@ from cosim.errors import BadInput
 from cosim.studies.study import Study, Told, loaded, studies
 
 CHART = "chart"
-"""The group of those that leave a table, a page and figures in one folder."""
+"""The group of commands that write a table, a page and figures into one folder."""
 
 
 def commands() -> list[Command]:
-    """A command for each study that is one."""
+    """A command for each study that declares one."""
     found = [(study.command.split(), study) for study in studies() if study.command]
     alone = [_command(words[0], study) for words, study in found if len(words) == 1]
     charts = [_command(words[1], study) for words, study in found if words[0] == CHART]
@@ -29,7 +29,7 @@ def _command(name: str, study: Study) -> Command:
 
 
 def _run(study: Study, out: Path | None = None, **asked: Any) -> None:
-    """Run a study with what was asked, save and tell what it finds."""
+    """Run a study with the options given, save and print its results."""
     for option in study.options:
         if option.prints and asked.pop(option.argument, False):
             if asked or out:
@@ -78,7 +78,7 @@ def _run(study: Study, out: Path | None = None, **asked: Any) -> None:
 
 @dataclass
 class _Steps:
-    """How far a study is; a bar that is not shown does not count."""
+    """A study's progress, counted here since a hidden progress bar does not count."""
 
     unit: str
     done: int = 0
@@ -90,7 +90,7 @@ class _Steps:
 
 
 def _show(bar: Any, steps: _Steps, means: Told, *told: Any) -> None:
-    """Move the bar as ``means`` makes of what was ``told``."""
+    """Move the bar; ``means`` turns the study's message into steps done, total and words."""
     done, total, words = means(*told)
     steps.done = steps.done + 1 if done is None else done
     steps.total = total or steps.total

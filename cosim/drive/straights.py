@@ -78,7 +78,7 @@ def straight(piece: Piece, begin: float) -> tuple[float, float, float]:
 
 
 def _times(rate: float, begin: float, stop: float) -> Array:
-    """Ends of straights, ``rate`` per second, from ``begin`` to ``stop`` (s), where the last ends."""
+    """Ends of straights, ``rate`` per second, from ``begin`` to ``stop`` (s), the last end."""
     step = 1.0 / rate
     count = max(1, ceil((stop - begin) / step - 1e-6))
     return np.append(begin + step * np.arange(count), stop)

@@ -1,5 +1,5 @@
-"""A netlist as an FMU: the deck written anew from what was parsed of it, in a library that runs
-ngspice where the importer has it (``fmu/netlist``)."""
+"""A netlist as an FMU: the deck, written anew from the parsed netlist, with a library that runs the
+importer's own ngspice (``fmu/netlist``)."""
 
 import hashlib
 import re
@@ -27,8 +27,8 @@ def netlist(
     reltol: float = 1e-5,
     version: int = 2,
 ) -> None:
-    """Write an .fmu of a netlist whose sources ``inputs`` the importer sets, and of which it reads
-    the ``outputs``, vectors or expressions. Raises BadInput."""
+    """Write an .fmu of a netlist: the importer sets the sources ``inputs``, and reads ``outputs``,
+    vectors or expressions. Raises BadInput."""
     if not 0.0 < max_step < inf or not 0.0 < reltol < 1.0:
         raise BadInput("--max-step must be above 0 s and finite, and --reltol between 0 and 1.")
     if len({name.lower() for name in inputs}) < len(inputs):
@@ -49,18 +49,18 @@ def write(
     fmi: int,
     pulses: Sequence[str] = (),
 ) -> None:
-    """Write the .fmu of a deck: of its external sources with their kinds, ``v`` or ``i``, and of
-    words with the vectors that have their values."""
-    # What an .fmu has another variable for, or the netlist two values, is no parameter of it.
+    """Write the .fmu of a deck: ``inputs`` are its external sources with their kinds, ``v`` or
+    ``i``, ``outputs`` words with the vectors that have their values."""
+    # A .param is no parameter of the FMU if another variable has its name, or it has two values.
     given = [*_given(text)]
     taken = {"time", *inputs, *(f"{name}_slope" for name in inputs), *outputs}
     taken |= {name for name, count in Counter(name for name, _ in given).items() if count > 1}
-    rows = [("parameter", k, "1", repr(x), "Of the netlist", k) for k, x in given if k not in taken]
+    rows = [("parameter", k, "1", repr(v), "Of the netlist", k) for k, v in given if k not in taken]
     for name, kind in inputs.items():
         rows.append(("input", name, _UNITS[kind], "0", "Value of the source", name.lower()))
     for words, vector in outputs.items():
-        of = _UNITS.get(unit(words), unit(words))
-        rows.append(("output", words, of, "0", "At the last accepted step", sent(vector)))
+        shown = _UNITS.get(unit(words), unit(words))
+        rows.append(("output", words, shown, "0", "At the last accepted step", sent(vector)))
     rows += [("pulse", name) for name in pulses]
     name = re.sub(r"\W", "_", target.stem, flags=re.ASCII)
     rows = [("about", f"{plain(target.stem)}, computed by ngspice"), ("step", repr(step)), *rows]

@@ -1,4 +1,4 @@
-"""An .fmu of a library that says itself what it is (``fmu/thin``)."""
+"""An .fmu of a library that writes its own model description (``fmu/thin``)."""
 
 import ctypes
 import tempfile

@@ -1,6 +1,6 @@
-"""The whole machine as an .ssp: circuit, mechanics and what joins them, for other masters.
+"""The whole machine as an .ssp for other masters: circuit, mechanics and their connections.
 
-The drive is a source of the netlist's own, so that it runs by itself.
+The drive is a PWL source within the netlist, so that the machine needs no other input.
 """
 
 import tempfile
@@ -23,19 +23,19 @@ from cosim.scene import Scene
 from cosim.scene.firmware import GAIN
 
 _FALL = 1e-9
-"""s; of a jump of the drive, which ngspice's own sources want above 0."""
+"""s; duration of a jump of the drive, which must be above 0 in a PWL source."""
 
 _PARTS = 400
-"""Straight lines to a period of a sine."""
+"""Straight lines per period of a sine."""
 
-_AT_A_TIME = 512
+_AT_A_TIME = 512  # pieces of the drive
 
 _MOST = 200_000
-"""Points of a source; a longer table takes ngspice long at each step."""
+"""Most points of a source; ngspice searches them at each step."""
 
 _CURRENT = "cosim_current"
 _SHOWN = {"z_surface": "m", "z_part": "m", "v_part": "m/s", "friction_force": "N"}
-"""What the mechanics show besides."""
+"""Further outputs of the mechanics, with their units."""
 
 
 def ssp(scene: Scene, target: Path, fmi: int = 2) -> None:
@@ -90,7 +90,7 @@ def _points(scene: Scene, column: str) -> list[tuple[float, float]]:
         same = abs(values[0] - found[-1][1]) <= 1e-12
         if not same:
             t[0] += _FALL
-        found += zip(t[same:].tolist(), values[same:], strict=True)
+        found += zip(t[same:].tolist(), values[same:], strict=True)  # without a repeated point
         if len(found) > _MOST:
             raise BadInput(
                 f"scene {scene.name}: its drive has more than {_MOST} corners; a shorter "
@@ -119,7 +119,7 @@ def _values(piece: Piece, until: float, column: str) -> list[float]:
         parts = max(1, round((until - piece.begin) * abs(piece.rate) * _PARTS))
     times = np.linspace(piece.begin, until, parts + 1)
     values = [*map(piece.value, times[:-1].tolist()), piece.before(until)]
-    # Of a smooth command a piece does not have the DAC's voltage, which makes it of the pin's.
+    # Pieces of a smooth command lack the DAC's voltage; it follows from the pin's and V1.
     return values if column == "v1" else [piece.pin - value / GAIN for value in values]
 
 

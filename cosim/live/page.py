@@ -1,4 +1,4 @@
-"""Pages of one HTML file that need nothing else, and ask nobody; that of `cosim live`."""
+"""Self-contained HTML pages that load nothing from elsewhere; the page of `cosim live`."""
 
 import base64
 import hashlib
@@ -23,27 +23,28 @@ _CORE = ("machine.js", "hosts.js")
 _SCRIPTS = ("machine.js", "settings.js", "plot.js", "picture.js", "curves.js", "page.js")
 
 MOST_ROWS = 1_000_000
-"""Of a record, at its usual rate."""
+"""Rows of a record, resampled at its median step."""
 
 CIRCUITS: dict[str, dict[str, Any]] = {
     model: {"circuit.model": model} for model in ("amplifier", "full")
 }
-"""What the server runs with ngspice, by the page's names, as values of a scene's keys, and the
-ports of a netlist that has them."""
+"""Circuits that the server runs with ngspice, by their names on the page: values of a scene's keys,
+and under "port" the ports of a netlist that has any."""
 
 
 def opened(scene: str, overrides: Iterable[str] = ()) -> tuple[str, dict[str, dict[str, Any]]]:
-    """The link of a scene, as the page takes it, and the circuits that the server runs it with: a
-    netlist of the user's own is one of them. Raises BadInput for one that the page cannot run."""
+    """The link of a scene for the page, and the circuits with which the server runs it. A user's
+    netlist becomes the circuit "own", while the page itself runs the scene without it. Raises
+    BadInput for a scene that the page cannot run."""
     found, circuits = load(scene, list(overrides)), dict(CIRCUITS)
     if found.circuit.netlist and not found.has_ports:
-        kept = found.table("circuit")
-        own = {key: kept.pop(key, None) for key in ("netlist", "reltol", "max_step")}
+        rest = found.table("circuit")
+        own = {key: rest.pop(key, None) for key in ("netlist", "reltol", "max_step")}
         own["netlist"] = str(Path(own["netlist"]).absolute())
-        own |= {f"param.{key}": x for key, x in (kept.pop("param", None) or {}).items()}
-        own = {"circuit.model": "file"} | {f"circuit.{k}": x for k, x in own.items()}
+        own |= {f"param.{key}": v for key, v in (rest.pop("param", None) or {}).items()}
+        own = {"circuit.model": "file"} | {f"circuit.{key}": v for key, v in own.items()}
         circuits = {"own": own | ({"port": found.port} if found.port else {})} | circuits
-        simple = type(found.circuit).model_validate(kept | {"model": "amplifier"})
+        simple = type(found.circuit).model_validate(rest | {"model": "amplifier"})
         found = found.model_copy(update={"circuit": simple, "port": []})
     if not rigs.fits(found):
         known = ", ".join(rigs.scenes())
@@ -60,10 +61,10 @@ def opened(scene: str, overrides: Iterable[str] = ()) -> tuple[str, dict[str, di
 
 
 def html(link: str, models: Iterable[str] = (), record: Recording | None = None) -> str:
-    """The page, which begins with the setting of ``link`` unless its address has another.
+    """The page, which starts with the setting of ``link`` unless its address has another.
 
-    It may ask its own server for runs with the circuits ``models``. ``record``, measurements of a
-    machine, can be laid over its curves. Raises BadInput.
+    It offers runs by its own server with the circuits ``models``. ``record``, measurements of a
+    machine, is laid over its curves. Raises BadInput.
     """
     known = rigs.data() | {"start": link, "models": [*models]}
     known |= {"heat": DRIVE_RANGE_HEAT, "copper": COPPER, "frame_rate": FRAME_RATE}
@@ -74,7 +75,7 @@ def html(link: str, models: Iterable[str] = (), record: Recording | None = None)
 
 
 def script_of(given: dict[str, Any], scripts: tuple[str, ...]) -> str:
-    """Constants by name, as JSON that cannot end a script's element, and scripts that take them."""
+    """A script: constants by name, as JSON that cannot end a script element, then ``scripts``."""
     code = ['"use strict";']
     for name, value in given.items():
         content = json.dumps(value, separators=(",", ":"), allow_nan=False)
@@ -83,7 +84,8 @@ def script_of(given: dict[str, Any], scripts: tuple[str, ...]) -> str:
 
 
 def page(name: str, code: str, asks: str) -> str:
-    """The page of that name with its script, which alone may run; it ``asks`` nobody else."""
+    """The page ``name`` with its script ``code``. Its policy lets only this script run, and connect
+    only to ``asks``."""
     digest = base64.b64encode(hashlib.sha256(code.encode()).digest()).decode()
     policy = (
         f"default-src 'none'; script-src 'sha256-{digest}' 'wasm-unsafe-eval' data: blob:; "
@@ -102,7 +104,7 @@ def script(names: tuple[str, ...]) -> str:
 
 
 def _record(found: Recording) -> dict[str, Any]:
-    """Measurements as the page takes them: in even steps, s; None where nothing is known."""
+    """Measurements for the page, in even steps (s); None where there is no sample nearby."""
     step = float(np.median(np.diff(found.time)))
     even = np.arange(min(round(found.time[-1] / step) + 1, MOST_ROWS)) * step
     after = np.searchsorted(found.time, even).clip(1, len(found.time) - 1)
@@ -111,14 +113,14 @@ def _record(found: Recording) -> dict[str, Any]:
     signals = {}
     for name, values in found.signals.items():
         there = np.where(known, values[nearest], np.nan).tolist()
-        signals[name] = [x if isfinite(x) else None for x in there]
+        signals[name] = [value if isfinite(value) else None for value in there]
     return {"name": found.name, "step": step, "waveforms": signals}
 
 
 def answer(link: str, circuit: dict[str, Any], progress: Progress) -> dict[str, Any]:
-    """What ngspice has for a link of the page: mean velocity (m/s) of a second, and the waveforms
-    of its last 0.3 s or two periods, from ``begin`` on, s after the drive's phase was 0.
-    ``progress`` is told the simulated time, s, and may end the run. Raises CosimError."""
+    """ngspice's result for a link of the page: the mean velocity (m/s) over a second, and waveforms
+    of its last 0.3 s or two periods; ``begin`` is their start, s after the drive's phase was 0.
+    ``progress`` is called with the simulated time, s, and may raise. Raises CosimError."""
     from cosim.simulation.simulate import simulate
 
     values = {key: x for key, x in circuit.items() if key != "port"}

@@ -1,4 +1,4 @@
-"""What the page knows: the built-in rigs, the keys that can be turned, and the firmware's knobs."""
+"""The page's data: the built-in rigs, the keys that can be changed, and the firmware's knobs."""
 
 import json
 from pathlib import Path
@@ -20,12 +20,12 @@ _TURNED = {
     "circuit": {"model", "supply", "swing_loss_high", "swing_loss_low"},
     "coil": {"polarity"},
 }
-"""Besides those that are the FMU's variables."""
+"""Keys that the page changes besides those that are variables of the FMU."""
 _CHOICES = {"drive.waveform": COMMANDS, "circuit.model": (MODEL,)}
 
 
 def turned() -> dict[str, Key]:
-    """The keys that the page turns, by their full names."""
+    """The keys that the page changes, by their full names."""
     return {
         full: key
         for full, key in KEYS.items()
@@ -48,12 +48,12 @@ def fits(scene: Scene) -> bool:
 
 
 def _scene(scene: Scene) -> dict[str, Any]:
-    """What differs from the defaults."""
+    """A scene for the page: the keys that differ from their defaults, and what follows from it."""
     own = {full: getattr(getattr(scene, key.table), key.name) for full, key in turned().items()}
     for knob, key in KNOBS.items():
         if own[f"drive.{knob}"] is not None:
             own[f"drive.{key}"] = None
-    values = {full: x for full, x in own.items() if x not in (None, turned()[full].default)}
+    values = {full: v for full, v in own.items() if v not in (None, turned()[full].default)}
     values.pop("circuit.model", None)
     _, integers = parameters(load(scene, {"circuit.model": MODEL}))
     variables = {key.variable for key in turned().values()}
@@ -78,8 +78,8 @@ def _key(key: Key) -> dict[str, Any]:
 
 
 def knobs() -> dict[str, list[float]]:
-    """What each of the 10-bit codes of the three knobs stands for: peak-to-peak voltage (V),
-    frequency (Hz), and V1 at the end of the ramp (V), which is the offset pin's."""
+    """The value of each 10-bit code of the three knobs: peak-to-peak voltage (V), frequency (Hz),
+    and V1 at the end of the ramp (V), which the offset pin sets."""
     pots = [code / firmware.COUNTS for code in range(firmware.COUNTS)]
     return {
         "amplitude": [firmware.knob_amplitude(pot) for pot in pots],
@@ -89,7 +89,7 @@ def knobs() -> dict[str, list[float]]:
 
 
 def data() -> dict[str, Any]:
-    """All of it, as JSON can hold it."""
+    """All the page's data, as JSON can hold it."""
     return {
         "scenes": {name: _scene(scene) for name, scene in scenes().items()},
         "keys": {full: _key(key) for full, key in turned().items()},

@@ -17,11 +17,11 @@ from cosim.trials.recording import Recording
 HOST = "127.0.0.1"
 
 MOST, MOST_AWAITED = 60.0, 5.0
-"""s that a run may take: at all, and once another request waits for its end."""
+"""s of wall time that a run may take: in general, and once another request waits."""
 
 
 class _Handler(BaseHTTPRequestHandler):
-    """``/`` is the page; ``POST /run/CIRCUIT`` takes a link of it. Nothing else is there."""
+    """``GET /`` is the page; ``POST /run/CIRCUIT`` runs a link; all else is refused."""
 
     server: "Server"  # pyright: ignore[reportIncompatibleVariableOverride]
     timeout = 30
@@ -34,7 +34,7 @@ class _Handler(BaseHTTPRequestHandler):
             self._tell(404, {"error": "There is only the page itself, for this machine."})
 
     def do_POST(self) -> None:
-        """Only the page itself may ask: another site's has another origin."""
+        """Run a link for the page itself; pages of other sites have another origin."""
         length = self.headers.get("Content-Length", "")
         circuit = self.server.circuits.get(self.path.removeprefix("/run/"))
         sound = length.isdecimal() and len(length) < 10 and int(length) <= LONGEST
@@ -50,7 +50,8 @@ class _Handler(BaseHTTPRequestHandler):
             self._tell(400, {"error": str(error)})
 
     def _from_here(self, needs_origin: bool = False) -> bool:
-        """A name that leads here from elsewhere is refused, as is a page from elsewhere."""
+        """Whether Host and Origin are this server's address: a foreign host name that resolves to
+        this machine is refused, as is a page of another site."""
         origin = self.headers.get("Origin", None if needs_origin else self.server.address)
         return f"http://{self.headers.get('Host')}" == self.server.address == origin
 
@@ -66,7 +67,7 @@ class _Handler(BaseHTTPRequestHandler):
         self.wfile.write(body)
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Nothing is written down."""
+        """Log nothing."""
 
 
 class Server(ThreadingHTTPServer):
@@ -75,7 +76,7 @@ class Server(ThreadingHTTPServer):
     daemon_threads = True
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A page that is closed meanwhile needs no word."""
+        """Ignore connections that a closed page has broken."""
         if not isinstance(sys.exception(), ConnectionError):
             super().handle_error(request, client_address)
 
@@ -91,7 +92,7 @@ class Server(ThreadingHTTPServer):
         Thread(target=self._warm, args=(link,), daemon=True).start()
 
     def run(self, link: str, circuit: dict[str, Any]) -> dict[str, Any]:
-        """One at a time. Raises CosimError, also where the run takes too long."""
+        """Run a link, one at a time. Raises CosimError, also where the run takes too long."""
         self.asked = own = self.asked + 1
         with self.one_run, warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -108,6 +109,6 @@ class Server(ThreadingHTTPServer):
             return answer(link, circuit, heed)
 
     def _warm(self, link: str) -> None:
-        """The first run would wait for what all runs need."""
+        """Make a first run, so that modules and workers are loaded before the page asks."""
         with suppress(CosimError):
             self.run(link, CIRCUITS["amplifier"])

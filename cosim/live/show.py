@@ -1,7 +1,7 @@
-"""The page of `cosim show`: what a folder of results holds, as one HTML file to look into and mail.
+"""The page of `cosim show`: a folder of results as one HTML file to look into and mail.
 
-A file begins with the page, its script and, of long runs, lowest and highest values of each
-``BUCKET`` rows; so it is there before the rows, which follow in blocks.
+The file begins with the page, its script and, for long runs, the lowest and highest value in each
+``BUCKET`` rows, so that a browser can draw before it has read the rows, which follow in blocks.
 """
 
 import json
@@ -32,11 +32,11 @@ BLOCK = 1 << 15
 BUCKET = 256
 """Rows."""
 
-MOST_POINTS = 100_000
-_HEAD = re.compile(r"(.+) \[(.+)\]")
+MOST_POINTS = 100_000  # of a sweep
+_HEAD = re.compile(r"(.+) \[(.+)\]")  # name [unit]
 
 Run = list[Array]
-"""Columns; the first is what they go over."""
+"""Columns; the first is the abscissa."""
 
 
 def show(results: Path, out: Path | None = None) -> Path:
@@ -60,7 +60,7 @@ def show(results: Path, out: Path | None = None) -> Path:
 
 
 def _read(results: Path) -> tuple[dict[str, Any], list[Run]]:
-    """What the page's script takes, and the rows behind it."""
+    """The data of the page's script, and the runs whose rows follow it."""
     if (results / "waveforms.nc").exists():
         found, scene = formats.read(results), load(results / "scene.toml")
         runs = [[*found.waveforms.values()]]
@@ -96,6 +96,7 @@ def _read(results: Path) -> tuple[dict[str, Any], list[Run]]:
 
 
 def _sweep(folder: Path) -> tuple[dict[str, Any], list[Run]]:
+    """A cloud of a sweep's points, and the curves of those whose waveforms were saved."""
     data = read_sweep(folder)
     grid, path = data["failure"], folder / "sweep.nc"
     axes = swept(data)
@@ -135,7 +136,8 @@ def _sweep(folder: Path) -> tuple[dict[str, Any], list[Run]]:
 
 
 def _table(path: Path) -> tuple[dict[str, Any], list[Run]]:
-    """Curves of a table that begins with the time; a cloud of any other, and a chart's pictures."""
+    """Curves of a table whose first column is time; else a cloud of points, with the pictures of a
+    chart."""
     cells = read_cells(path)
     cells.even(1)
     header, heads = [*cells.rows[0][1]], {}
@@ -171,8 +173,8 @@ def _table(path: Path) -> tuple[dict[str, Any], list[Run]]:
 
 
 def _comparison(path: Path) -> tuple[dict[str, Any], list[Run]]:
-    """Curves of a comparison's frames; heights from their first that was measured, as in its
-    figure: a camera's zero is not the machine's."""
+    """Curves of a comparison's frames. As in its figure, heights count from the first frame that
+    was measured, since a camera's zero is not the machine's."""
     shown, runs = _table(path)
     ((time, *curves),) = runs
     units = {column["name"]: column["unit"] for column in shown["signals"]["columns"]}
@@ -188,8 +190,8 @@ def _comparison(path: Path) -> tuple[dict[str, Any], list[Run]]:
 
 @contextmanager
 def _whole_results(path: Path) -> Iterator[dict[str, Any]]:
-    """What a file of results holds. Raises BadInput where that, or what the block makes of it, is
-    not what such a file has."""
+    """The content of a file of results. Raises BadInput where it, or an access to it within the
+    context, shows that it is not such a file."""
     try:
         yield dict(json.loads(reader.read(path, LARGEST)))
     except (AttributeError, KeyError, TypeError, ValueError, OverflowError, RecursionError):
@@ -197,16 +199,16 @@ def _whole_results(path: Path) -> Iterator[dict[str, Any]]:
 
 
 def _column(name: str, unit: str, values: list[Any], text: str = "") -> dict[str, Any]:
-    """A column of a cloud; ``most`` is None where it has words."""
-    kept = [v if isinstance(v, str) or (v is not None and isfinite(v)) else None for v in values]
-    known = [v for v in kept if v is not None]
+    """A column of a cloud; ``most``, its largest magnitude, is None for a column of words."""
+    finite = [v if isinstance(v, str) or (v is not None and isfinite(v)) else None for v in values]
+    known = [v for v in finite if v is not None]
     words = not known or any(isinstance(v, str) for v in known)
     most = None if words else max(abs(float(v)) for v in known)
-    return {"name": name, "unit": unit, "text": text, "values": kept, "most": most}
+    return {"name": name, "unit": unit, "text": text, "values": finite, "most": most}
 
 
 def _signals(units: dict[str, str], runs: list[Run]) -> dict[str, Any]:
-    """Of the runs' columns, by name, what is there before the rows; a panel for each unit."""
+    """Data on the runs' columns, which precede the rows; columns of one unit share a panel."""
     (x, unit), *others = units.items()
     panels: dict[str, list[int]] = {}
     columns = [{"name": x, "unit": unit, "most": 0.0}]
@@ -224,7 +226,7 @@ def _head(run: Run) -> dict[str, Any]:
     time, count = run[0], len(run[0])
     step = float(time[-1] - time[0]) / max(1, count - 1)
     even = np.abs(time - (time[0] + step * np.arange(count))) <= 1e-6 * step
-    # Rows that are no even steps apart come after the script that asks for these.
+    # Without a step the page takes the times from the rows, which it reads later.
     ends = {"begin": float(time[0]), "end": float(time[-1])}
     found = ends | {"count": count, "step": step if even.all() else None}
     if count > 4 * BLOCK:
