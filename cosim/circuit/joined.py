@@ -76,13 +76,11 @@ def deck(
     called: tuple[str, str] = ("[[port]] source", "probe or circuit.save"),
     through: Sequence[tuple[str, str]] = (),
 ) -> Deck:
-    """The deck of a netlist in which the ``sources`` are external and the ``words`` are saved. If
-    the words are ``asked`` for within a step, each is also available as a device's parameter.
-
-    ``known`` are values for ``.param`` lines that the netlist may have, ``parameters`` for those
-    that it must have. For each pair (source, word) of ``through`` the circuit adds the word to the
-    source, times the external source ``Vcosim_gain`` with the pair's number. ``called`` is what
-    messages call a source and a word.
+    """The deck of a netlist in which the ``sources`` are external and the ``words`` are saved; if
+    ``asked`` for within a step, each word is also a device's parameter. ``known`` are values for
+    ``.param`` lines that the netlist may have, ``parameters`` for those that it must have. For each
+    source and word of ``through`` the circuit adds the word, times the external source
+    ``Vcosim_gain`` with the pair's number, to the source. Messages use the names ``called``.
 
     Raises BadInput: for the netlist with its line, for the rest with what is wrong in the scene.
     """
@@ -144,8 +142,7 @@ def _edges(step: float, sources: Iterable[Sequence[str]]) -> float:
     for words in sources:
         if "pulse" in words:
             values = [number(word) for word in words[words.index("pulse") + 1 :]]
-            # PULSE(v1 v2 delay rise fall on-time period)
-            lengths += [0.01 * value for value in values[5:7] if value]
+            lengths += [0.01 * value for value in values[5:7] if value]  # on-time and period
     return min(lengths)
 
 
@@ -185,8 +182,7 @@ def text_of(
 
 
 def _external(element: Element, through: Sequence[tuple[str, str]]) -> Iterator[str]:
-    """The lines of a source whose value the host sets; with ``through``, a B source adds terms to
-    it: in series with a voltage source, in parallel with a current source."""
+    """The lines of a source set by the host; a B source in series or parallel adds ``through``."""
     (plus, minus), name = element.nodes, element.name
     shares = [(k, words) for k, (source, words) in enumerate(through) if source.lower() == name]
     between = minus
@@ -239,9 +235,8 @@ def reading(words: Sequence[str], asked: int = 0) -> list[tuple[str, str]]:
 
 
 def _direct(words: Sequence[str], asked: int) -> list[re.Match[str] | None]:
-    # The match of each word that is a vector as it stands; None where a B source must compute it.
-    # Within a step ngspice gives no node's voltage, but that of a source that copies it. Nor has it
-    # a vector for every current, while a source may read each.
+    # Matches of words that are vectors; None where a B source must compute one: within a step any
+    # node's voltage, and always a current that ngspice has no vector for.
     found = []
     for k, each in enumerate(words):
         match, current = _VECTOR.fullmatch(each), each[:1].lower() == "i"

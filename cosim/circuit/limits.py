@@ -15,10 +15,9 @@ def shares_of_steps(log: dict[str, Array], least: float) -> dict[str, Array]:
     any of them but the slew rate, if the swing is known. A limit acts while the magnitude of its
     node is at least ``least``, V.
 
-    Where a limit begins or ends within a step, a straight line through the two points before is
-    extrapolated. It begins when the limited quantity reaches its value at the step's end; it ends
-    when the node falls to ``least``. Where the line does not lead there, as for a node of only two
-    values, the step counts half.
+    Where a limit begins or ends within a step, the line through the two points before is continued:
+    it begins when the limited quantity reaches its value at the step's end, and ends when the node
+    falls to ``least``. Without such a crossing, as for a node of two values, a step counts half.
     """
     found: dict[str, Array] = {}
     time = log["time"]

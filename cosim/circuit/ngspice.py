@@ -2,8 +2,7 @@
 
 Order of calls within a transient run (ngspice 39): for each attempted step ``GetVSRCData`` at every
 Newton iteration and then ``GetSyncData`` at location 1; for an accepted step ``SendData`` and then
-``GetSyncData`` at location 0, where the next step may be shortened. After the last step the call at
-location 0 is missing.
+``GetSyncData`` at location 0, where the next step may be shortened; it is missing after the last.
 
 The library reads .spiceinit from the home and the working folder, and spinit from the folder that
 SPICE_SCRIPTS names: for a worker all three are an empty folder.
@@ -55,8 +54,7 @@ class Leader(Protocol):
     """A run, for which the compiled callbacks act."""
 
     places: Any
-    """ctypes array, to be filled: the indices of the saved vectors, and last of the time, among
-    the vectors that ngspice sends."""
+    """ctypes array, to be filled: indices of the saved vectors, then of time, among those sent."""
 
     def begin(self) -> None:
         """The callbacks act for this run from now on."""

@@ -55,8 +55,7 @@ class Event:
 
 @dataclass(frozen=True)
 class Measure:
-    """A ``.meas`` line: the operation ``what`` on the expression ``of``, between two events or at
-    one."""
+    """A ``.meas`` line: operation ``what`` on expression ``of``, between two events or at one."""
 
     line: Line
     name: str

@@ -84,8 +84,7 @@ def script_of(given: dict[str, Any], scripts: tuple[str, ...]) -> str:
 
 
 def page(name: str, code: str, asks: str) -> str:
-    """The page ``name`` with its script ``code``. Its policy lets only this script run, and connect
-    only to ``asks``."""
+    """The page ``name``, whose policy lets only its script ``code`` run, and ask only ``asks``."""
     digest = base64.b64encode(hashlib.sha256(code.encode()).digest()).decode()
     policy = (
         f"default-src 'none'; script-src 'sha256-{digest}' 'wasm-unsafe-eval' data: blob:; "

@@ -50,8 +50,7 @@ class _Handler(BaseHTTPRequestHandler):
             self._tell(400, {"error": str(error)})
 
     def _from_here(self, needs_origin: bool = False) -> bool:
-        """Whether Host and Origin are this server's address: a foreign host name that resolves to
-        this machine is refused, as is a page of another site."""
+        """Whether Host and Origin are this server's address; a host name from elsewhere is not."""
         origin = self.headers.get("Origin", None if needs_origin else self.server.address)
         return f"http://{self.headers.get('Host')}" == self.server.address == origin
 

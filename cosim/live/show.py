@@ -136,8 +136,7 @@ def _sweep(folder: Path) -> tuple[dict[str, Any], list[Run]]:
 
 
 def _table(path: Path) -> tuple[dict[str, Any], list[Run]]:
-    """Curves of a table whose first column is time; else a cloud of points, with the pictures of a
-    chart."""
+    """Curves of a table whose first column is time; else a cloud, and a chart's pictures."""
     cells = read_cells(path)
     cells.even(1)
     header, heads = [*cells.rows[0][1]], {}

@@ -41,10 +41,9 @@ FASTEST = 1e-6
 coil, of a damper with its mass, and of a spring with its mass (1/ω)."""
 
 FASTEST_NEAR, FASTEST_FAR, FAR = 1e-13, 1e-8, 2.0
-"""Least time constants, s, of a coil in ngspice; faster coils take above a minute for 0.1 s.
-FASTEST_FAR holds where the drive asks for more than FAR times the output's limit, so that the
-output is limited for a third of the time or more. FASTEST_NEAR holds otherwise; below it rounding
-within a step looks like a motion towards the limits."""
+"""Least time constants, s, of a coil in ngspice; faster coils take above a minute for 0.1 s. FAR
+is for a drive that asks for FAR times the output's limit, which then acts for a third of the time
+and more; NEAR for others, where rounding in a step looks like a motion towards the limits."""
 
 _FAST = {*VARIABLES.values(), "n_surfaces", "coil_count", "initial_lift"} | {
     *("restitution", "tolerance"),  # of rigid walls, and of the FMU's own steps
@@ -180,8 +179,7 @@ class Scene(BaseModel):
                     raise fault(f'[[port]] {key} = "{end}" is given twice')
 
     def _check_machine(self) -> None:
-        """Check ports of a scene without FMUs, which only name the machine's sources and vectors in
-        the netlist."""
+        """Check ports without FMUs, which only name the machine's ends in the netlist."""
         for port in self.port:
             end = port.to or port.origin
             if port.scale != 1.0 or port.offset != 0.0:
@@ -242,8 +240,7 @@ class Scene(BaseModel):
             )
 
     def _check_speed_of_mechanics(self) -> None:
-        """Springs and dampers that act all the time must not be stiff either; for the walls see
-        ``Pace``."""
+        """Springs and dampers that always act must not be stiff either; for walls see ``Pace``."""
         if self.surface_is_given:
             return
         rig = self.mechanics

@@ -68,8 +68,7 @@ def _declared(default: str, lead: str, registry: Mapping[str, Rung | CouplingMet
 def fault(sentence: str, *unnamed: str) -> PydanticCustomError:
     """A failed check of the keys ("table.key") that ``sentence``, without its full stop, names.
 
-    The message blames the last layer that gave any of these, or of the ``unnamed`` keys, which are
-    involved but not in the sentence.
+    The message blames the last layer that gave any of these, or of the ``unnamed``, involved keys.
     """
     keys = [*re.findall(r"\b[a-z]+\.[a-z]\w*", sentence), *unnamed]
     return PydanticCustomError("check", "{sentence}", {"sentence": sentence, "keys": keys})

@@ -9,8 +9,7 @@ from cosim.errors import BadInput, plain
 from cosim.files import reader
 
 MOST_PARTS = 8
-"""Most parts of a dotted key; a scene's have two. tomllib takes quadratic time in them: hours for
-1 MB."""
+"""Most parts of a dotted key, of a scene's two; tomllib takes quadratic time: hours for 1 MB."""
 
 LARGEST = 1 << 20
 """Bytes of a file; far above any honest one."""

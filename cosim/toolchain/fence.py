@@ -46,9 +46,8 @@ _DENIED = {
 """By machine: its number in seccomp_data; the denied calls (sockets; new programs; signals to other
 processes; their memory; their priorities; shared memory, semaphores and messages; watching files;
 truncating files, which Landlock forbids from version 3 on, and their owners, modes, times and
-attributes; calls for root only, and io_uring, which would bypass the filter); clone, allowed for
-threads only; tgkill, allowed to this process only, and prlimit and sched_setaffinity, allowed for
-the caller only."""
+attributes; calls for root only, and io_uring, which would bypass the filter); clone, for threads
+only; tgkill, to this process only, and prlimit and sched_setaffinity, for the caller only."""
 _CLONE3, _CLONE_THREAD = 435, 0x10000
 # Results of the filter: EPERM, ENOSYS, allowed, and the end of the process.
 _DENY, _UNKNOWN, _ALLOW, _KILL = 0x50001, 0x50026, 0x7FFF0000, 0x80000000
@@ -128,8 +127,8 @@ def _filter(system: ctypes.CDLL) -> bool:
     if machine not in _DENIED or sys.maxsize < 1 << 32:
         return False
     name, denied, clone, (tgkill, *own) = _DENIED[machine]
-    # BPF: an instruction is (code, jump if true, jump if false, operand). Loads take an offset into
-    # seccomp_data: 0 the call, 4 the machine, 16 the low half of the first argument.
+    # An instruction is (code, jump if true, jump if false, operand). Offsets in seccomp_data for
+    # loads: 0 the call, 4 the machine, 16 the low half of the first argument.
     load, equal, above, has, end = 0x20, 0x15, 0x35, 0x45, 0x06
 
     def only(call: int, test: int, value: int) -> list[tuple[int, int, int, int]]:

@@ -142,10 +142,9 @@ class Worker:
         self._send(bounds)
 
     def call(self, argument: Any, progress: Progress, heed: Callable[[], None]) -> Any:
-        """The function's result. Meanwhile ``progress`` is called with the simulated time reached,
-        and ``heed``, which may raise. Raises EOFError where the process has died, SimulationFailed
-        where it hangs, and the function's own exceptions. Unless the process has answered with a
-        result or BadInput, it is not ``usable`` again."""
+        """The function's result. Meanwhile ``progress`` is called with the time reached, and
+        ``heed``, which may raise. Raises EOFError where the process has died, SimulationFailed
+        where it hangs, or the function's exception; ``usable`` only after a result or BadInput."""
         self.given, self.began, self.usable = self.given + 1, False, False
         self._steps = False
         said: tuple[str, Any] | None = None
@@ -260,8 +259,7 @@ _idle: defaultdict[Any, "deque[Worker]"] = defaultdict(deque)
 deque and then lost by an interrupt is ended when Python frees it."""
 
 _places = threading.BoundedSemaphore(processors())
-"""Permits for processes at work. Signals are held back while a permit is taken, so that it is given
-back."""
+"""Permits for processes at work. Signals are held back while one is taken, so that none is lost."""
 
 _here = threading.local()
 
@@ -409,8 +407,7 @@ def end_idle(inside: Path) -> None:
 
 
 def _clear(owner: int, processes: "list[subprocess.Popen[Any]]", folder: str) -> None:
-    """Kill and remove what is left of a worker, once it is freed or this process ends; a forked
-    child is not the ``owner`` and does nothing."""
+    """Kill and remove a worker that is freed, or that its ``owner`` (no forked child) leaves."""
     if os.getpid() != owner:
         return
     for process in processes:
@@ -435,8 +432,7 @@ def _start(pipe: Connection, folder: str, lock: int, library: str) -> "subproces
         options = {"startupinfo": about}
     environment = {name: value for name, value in os.environ.items() if name.startswith(_KEPT)}
     environment |= {"NGSPICE_LIBRARY_PATH": library} if library else {}
-    environment |= dict.fromkeys(("HOME", "TMPDIR", "TEMP"), folder)
-    environment |= {"OPENBLAS_NUM_THREADS": "1"}
+    environment |= dict.fromkeys(("HOME", "TMPDIR", "TEMP"), folder) | {"OPENBLAS_NUM_THREADS": "1"}
     command = [sys.executable, "-P", "-c", _PROGRAM, type(pipe).__name__, str(handle)]
     options |= {"stdin": subprocess.PIPE, "cwd": folder, "env": environment}
     with open(os.path.join(folder, _SAID), "wb") as said:
@@ -479,8 +475,7 @@ def serve(pipe: Connection) -> None:
 
 
 used: "deque[Callable[[], object]]" = deque()
-"""Cleanup to be called after the answer to a call is sent: untrusted code may end the process in
-it."""
+"""Cleanup for after the answer to a call is sent, as untrusted code may end the process in it."""
 
 
 def end_used() -> None:

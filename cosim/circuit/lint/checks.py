@@ -19,12 +19,10 @@ REQUIRED = (("vemf", "vcommand"), ("vemf", "vdac", "voffset"))
 _NUMBER = re.compile(r"[+-]?(?:\d|\.\d)")
 _OPERATOR = re.compile(r"[*/^]")
 _BARE = re.compile(r"\b(?:[rclq]|flux)\s*=([^=]*?[()*/^][^=]*?)(?=\s\w+\s*=|$)", re.IGNORECASE)
-"""R=, C=, L=, Q= or flux= with operators outside braces, which ngspice does not evaluate; it ends
-at the next key."""
+"""R=, C=, L=, Q= or flux= with operators outside braces, which ngspice does not evaluate."""
 _FACTOR = re.compile(r"\s[rcl]\s*=\s*(?!1(?:\.0*)?(?![\w.]))[^\s()]+")  # in a model; not 1
 _WAVES = {"pulse": 7, "sin": 6, "exp": 6}
-"""Most values that each takes; the next one is a number of periods in LTspice, a phase in ngspice.
-"""
+"""Most values of each; one more is a number of periods in LTspice, a phase in ngspice."""
 _FOREIGN = (
     ("d", re.compile(r"\b((?:rev)?ilimit)\s*="),
      "is LTspice's ideal diode; write is, n and rs, or a B source"),
@@ -33,8 +31,7 @@ _FOREIGN = (
     ("sw", re.compile(r"\b([vi]h)\s*=\s*[{']?\s*-"),
      "below 0 is LTspice's smooth switch; give it as a plain number"),
 )  # fmt: skip
-"""Kinds of elements, parameters of their models that LTspice alone knows (ngspice would ignore
-them), and the end of the message."""
+"""Elements, parameters of their models that LTspice alone knows, and the end of the message."""
 _NO_VALUES = {"m", "temp", "dtemp", "tc", "tc1", "tc2", "ic", "scale", "noisy"}
 """Keys of R, C and L other than the value itself."""
 _WAVEFORMS = word_set(

@@ -25,8 +25,7 @@ MAX_LINES = 100_000
 MAX_WORD = 4_000
 MAX_DEPTH = 10
 MAX_INCLUDES = 1_000
-"""A file counts each time it is included: a chain of files that each include the next one twice
-doubles the count at every file."""
+"""A file counts each time it is included; files that each include the next twice double that."""
 MAX_NAMES = 1_000
 """File names that :func:`named` follows from one file."""
 
@@ -57,8 +56,7 @@ DROPPED_OPTIONS = word_set(
     "nopage numdgt opts plotabstol plotreltol plotvntol plotwinsize post probe savecurrents "
     "runlvl srcstepmethod stepgmin thev_induc topologycheck warn width wnflag"
 )
-"""Options for output, which a host sets itself (``interp`` gives wrong waveforms), and options of
-other programs."""
+"""Options for output, which a host sets (``interp`` gives wrong waveforms), or other programs'."""
 
 MODELS = word_set("r res c l d npn pnp nmos pmos vdmos njf pjf nmf pmf sw csw vswitch iswitch ltra")
 """Not numd, nbjt, numos, whose cards name files, and no code models."""
@@ -200,9 +198,8 @@ class _Reader:
     def _take(
         self, lines: Iterator[Line], opened: tuple[Path, ...], section: str | None = None
     ) -> bool:
-        """Take the lines of a file, or those of a ``section`` between .lib and .endl; ``opened``
-        are the files that include each other, the current one last. Returns whether ``.end``, or
-        the section, was found."""
+        """Take the lines of a file, the last of ``opened``, or those of a ``section`` between .lib
+        and .endl. Returns whether ``.end``, or the section, was found."""
         inside = section is None
         found = False
         for line in lines:

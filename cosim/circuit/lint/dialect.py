@@ -260,8 +260,7 @@ def _apart(line: Line, scope: tuple[int, ...], known: Mapping[_Key, str]) -> lis
     law = _nearest(known, scope, name[:1], rest[count]) if len(rest) > count else None
     texts, (plus, minus, *control) = [line.text], rest[:count] if law else ["", ""]
     if (scope, name) in known and len(rest) > 2:
-        # At the operating point a source in series, of 1 GV per ampere of error, holds the current;
-        # during the run its voltage is 0.
+        # At the operating point a source of 1 GV per ampere of error holds the current, later 0 V.
         error = f"1e9*(i(v{name}_ic)-({known[scope, name]}))"
         texts = [
             " ".join([name, rest[0], f"{name}_ic", *rest[2:]]),
@@ -355,8 +354,7 @@ def _taken(text: str, keys: Collection[str]) -> tuple[str, dict[str, str]]:
 
 
 def _without_tables(text: str) -> str:
-    """Calls of ``table`` rewritten as ``pwl``, the last one first, so that inner calls precede
-    outer ones."""
+    """Calls of ``table`` rewritten as ``pwl``, the last one first, so inner before outer calls."""
     if text[:1].lower() in "eg":
         text = re.sub(r"(?i)(?<=\s)table\s*=\s*", "table ", text)  # the source's own, see below
     for match in [*_TABLE.finditer(text)][:_MOST][::-1]:
@@ -448,8 +446,7 @@ def _with_law(text: str) -> Iterator[str]:
     if law is None:
         yield text
     elif (key := law[1].lower()) == "flux" and name[0] in "lL":
-        # A gyrator: the voltage of node NAME_i is the coil's current, the charge of a capacitor
-        # there is its flux.
+        # A gyrator: the voltage of NAME_i is the current, the charge of a capacitor there the flux.
         yield f"g{name}_flux {plus} {minus} {name}_i 0 1"
         yield f"g{name}_x 0 {name}_i {plus} {minus} 1"
         value = _OWN.sub(f"v({name}_i)", law[2] or law[3])
@@ -516,8 +513,7 @@ def _gate(text: str) -> list[str]:
             for place in (0, 3, 4)
         )
         # Master w follows the data while the clock is low, slave s follows w while it is high. Each
-        # holds its voltage without any current; a source that compares it with 0.5 instead would
-        # have two solutions at the operating point.
+        # holds its voltage by no current: comparing it with a half instead has two solutions.
         up, master, y = f"v({name}_c_p)>0.5", f"v({name}_w)>0.5", f"v({name}_s)"
         first = _held(f"{name}_c", f"v({inputs[2]},{common})", ref, "0")
         for each, taken, follows in (("w", f"1-({up})", data), ("s", up, master)):
@@ -590,8 +586,7 @@ def _source(text: str) -> str:
 
 
 def _polynomial(found: list[str], kind: str) -> str | None:
-    """The expression of the words ``poly``, n, controls and coefficients; None where they are none.
-    The coefficients' order is SPICE's: constant, x, y, …, x·x, x·y, …, y·y, …"""
+    """The expression of ``POLY(n)``, controls, coefficients (of 1, x, y, …, x², xy, …), or None."""
     if len(found) < 2 or not re.fullmatch(r"[1-9]\d?", found[1]):
         return None
     dimension, each = int(found[1]), 2 if kind in "eg" else 1

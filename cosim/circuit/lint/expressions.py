@@ -31,8 +31,7 @@ BEHAVIOURAL = _COMMON | dict.fromkeys(word_set("ddt eq0 ge0 gt0 le0 lt0 ne0 u u2
 """Functions of ngspice's behavioural sources, except ``pwl``, which takes any number of points.
 Random functions are replaced by a number when ngspice reads the netlist."""
 MOST_CALLS, DEEPEST = 10_000, 100
-"""Limits of the calls that one call expands to, and of their nesting: ngspice 39 expands so many in
-0.15 s."""
+"""Limits of the calls that a call expands to, and of their nesting; ngspice 39 takes 0.15 s."""
 CONSTANTS = word_set("time temper hertz")
 BEHAVIOURAL_CONSTANTS = word_set("pi e i s")
 

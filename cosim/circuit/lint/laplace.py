@@ -26,8 +26,7 @@ _Ratio = tuple[_One, _One]
 
 
 def without_laplace(text: str) -> Iterator[str]:
-    """The lines of a filter and then of the source that it feeds; the text as it is if it has no
-    LAPLACE that can be read."""
+    """The lines of a filter and of the source that it feeds; the text itself without a filter."""
     match = _FORM.fullmatch(text.strip())
     name, plus, minus, control, law = match.groups() if match else ("", "", "", "", "")
     kind, u = "v" if name[:1] in "eE" else "i", ""
