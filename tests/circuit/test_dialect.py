@@ -150,7 +150,7 @@ TOLD = {
     ".func int(x) {idt(x)}\nB9 x 0 V=int(V(in))": "write it there instead of in a .func",
     ".control": "leave it out, and all up to .endc",
     "E9 x 0 FREQ {V(in)} = (0,0,0)": "FREQ is not known here",
-    "V9 x 0 PULSE(0 1 0 1n 1n 1u 2u 3)": "PULSE takes 7 values; leave out the next, a number of periods",
+    "V9 x 0 PULSE(0 1 0 1n 1n 1u 2u 3)": "PULSE takes 7 values; leave out the next",
     "V9 x 0 SINE(0 1 1k 0 0 0 5)": "SIN takes 6 values",
     "V9 x 0 PWL(0 0 {1m} 1 +1m 2)": "write the times of PWL since the start",
     "V9 x 0 PWL(0 0 1m 1 0.5m 0)": "the times of PWL must rise, 0.0005 s comes after 0.001 s",
