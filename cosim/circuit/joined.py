@@ -217,7 +217,8 @@ def check_reading(
         every |= {each: replace(ask.line, text=each) for each in ask.words if each not in every}
     direct = _direct([*every], len(words) if asked else 0)
     extra = [_source_of(k, line) for k, line in enumerate(every.values()) if direct[k] is None]
-    _check_vectors(parse(lines), every.values())
+    if every:
+        _check_vectors(parse(lines), every.values())
     return check([*lines, *extra], required), [*every]
 
 

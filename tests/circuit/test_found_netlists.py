@@ -194,11 +194,14 @@ R3 low N/C_01 1k
 B1 high 0 V={if(V(low),5,unit)}
 B2 both 0 V=5*(V(high)&V(low)) + (V(low) | V(high)) + 10*~V(low)
 .step param unit list 1 2
+.PARAM Far=3
+.step param far list 7 8
+B3 there 0 V={far}
 .meas tran most MAX V(p)*I(RLoad)
 .tran 5u 3m
 .end
 """
-    result = found(tmp_path, "", text, "v(p)", "i(RLoad)", "v(high)", "v(both)")
+    result = found(tmp_path, "", text, "v(p)", "i(RLoad)", "v(high)", "v(both)", "v(there)")
     time, pulse = result.columns["time"], result.columns["v(p)"]
     phase = time % 0.5e-3
     rising = (phase > 0.1e-6) & (phase < 2.4e-6)
@@ -206,6 +209,8 @@ B2 both 0 V=5*(V(high)&V(low)) + (V(low) | V(high)) + 10*~V(low)
     assert result.columns["i(RLoad)"] == pytest.approx(pulse / 1e3, abs=1e-9)
     assert np.all(result.columns["v(high)"] == 1.0)
     assert np.all(result.columns["v(both)"] == 11.0)
+    # Not what .step begins with; ngspice rounds parameters.
+    assert result.columns["v(there)"] == pytest.approx(3.0, rel=1e-12)
     assert result.summary["meas.most"] == pytest.approx(25e-3, rel=1e-6)
 
 

@@ -16,7 +16,7 @@ from unicodedata import category
 
 from cosim.circuit.lint.dialect import in_ngspice, in_ngspice_together, prelude, since_the_start
 from cosim.circuit.lint.lines import MAX_LINE, UNKNOWN, Line, refuse, shown
-from cosim.circuit.lint.words import number, word_set
+from cosim.circuit.lint.words import definitions, number, word_set
 from cosim.errors import BadInput, plain
 from cosim.files import reader
 
@@ -174,10 +174,11 @@ class _Reader:
 
     def _stepped(self) -> Iterator[Line]:
         """.param lines, with its first value, for each parameter that only a .step line defines."""
-        known = "\n".join(line.text for line in self.lines if line.text.startswith(".param"))
+        own = (line.text for line in self.lines if line.text.lower().startswith(".param"))
+        known = {name for text in own for (name, _), _ in definitions(text)}
         for line in self.dropped:
             step = _STEP.match(line.text)
-            if step and not re.search(rf"(?<!\w){step[1]}\s*=", known, re.IGNORECASE):
+            if step and step[1].lower() not in known:
                 yield replace(line, text=f".param {step[1]}={step[2]}")
 
     def _top(self) -> str:

@@ -71,12 +71,9 @@ _PARASITES = {"c": word_set("rser lser rpar cpar rlshunt"), "l": word_set("rser 
 _VALUE = r"(\{[^{}]*\}|'[^']*'|[^\s,()\"{}'=]++)"
 # KEY=VALUE, the value in double quotes or as _VALUE, without the latter's group.
 _PAIR = re.compile(rf"""(?<!\S)([a-z]\w*)\s*=\s*("[^"]*"|{_VALUE[1:-1]})""", re.IGNORECASE)
-_SPLIT_NUMBER = re.compile(r"^(\d+)(meg|[tgkmunpf])(\d+)(?!\S)", re.IGNORECASE)
-_GLUED = re.compile(r"(?<==)\s*(\d+)(meg|[tgkmunpf])(\d+)(?![\w.])", re.IGNORECASE)
-"""4k7 for 4.7k: as the first word, and behind an equals sign."""
-_WITHIN = re.compile(
-    r"v\s*\([^()]*\)|(?<![\w.$#])(\d+)(meg|[tgkmunpf])(\d+)(?![\w.])", re.IGNORECASE
-)
+_SPLIT = r"(\d+)(meg|[tgkmunpf])(\d+)"  # 4k7 for 4.7k
+_SPLIT_NUMBER = re.compile(rf"^{_SPLIT}(?!\S)", re.IGNORECASE)
+_WITHIN = re.compile(rf"v\s*\([^()]*\)|(?<![\w.$#]){_SPLIT}(?![\w.])", re.IGNORECASE)
 """4k7 in an expression. Node names within v(…) are matched first, without groups, to be kept."""
 _POINT = re.compile(r"^(\d+)r(\d+)(?!\S)", re.IGNORECASE)  # 4r7 for 4.7 ohm
 _VALUED = re.compile(r"(?<=\s)value\s*=?\s*(?={)", re.IGNORECASE)
@@ -155,19 +152,16 @@ def in_ngspice(line: Line) -> list[Line]:
     kind, word = text[:1].lower(), text[:4].lower()
     if kind in "beg":
         text = _VALUED.sub("value=", re.sub(r"'([^']*)'", r"{\1}", text))
+        text = _TRUTH.sub(lambda truth: f"({truth[1] or truth[2]}>0.5)", text)
         if len(parts := [*without_laplace(text)]) > 1:
             return [each for part in parts for each in in_ngspice(replace(line, text=part))]
     if word not in (".inc", ".lib"):  # names of files
-        if kind in "beg":
-            text = _TRUTH.sub(lambda truth: f"({truth[1] or truth[2]}>0.5)", text)
         text = _LOGIC.sub(lambda match: _LOGICAL[match[0]], text)
         text = text if word == ".mea" else _powers(text)
-    text = _GLUED.sub(r"\1.\3\2", text) if kind in "rclx" or _MODEL.match(text) else text
-    if kind == "b" or word in (".par", ".def"):
-        head, equals, rest = text.partition("=")
+    if kind in "brclx" or word in (".par", ".def") or _MODEL.match(text):
+        head, equals, rest = text.partition("=")  # behind which no node stands
         text = head + equals + _pointed(rest)
-    else:
-        text = re.sub(r"\{[^{}]*\}", lambda braced: _pointed(braced[0]), text)
+    text = re.sub(r"\{[^{}]*\}", lambda braced: _pointed(braced[0]), text)
     if kind in "beg":
         text = _EQUAL.sub(_compared, text)
         # Only where some braced expression is not already one pair of parentheses.

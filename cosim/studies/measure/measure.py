@@ -31,7 +31,7 @@ from cosim.studies.measure.worth import FEWEST, Worth, chance, worth
 from cosim.studies.plots import BLUE, ORANGE, panels
 from cosim.studies.report import Progress, Report, Row, brief, counted, silent
 from cosim.studies.study import check_seed
-from cosim.waveforms.quantities import signed
+from cosim.waveforms.quantities import percent, signed
 
 RIGS, QUICK, LEAST = 48, 24, 4
 """Number of rigs in the sample; with ``quick``; least number of rigs in a file."""
@@ -172,9 +172,7 @@ def _films(values: Mapping[Candidate, Array]) -> str:
 
 def _accuracy(one: Candidate) -> str:
     return ", ".join(
-        f"{100.0 * gauge.share:.2g} %"
-        if gauge.share
-        else f"{gauge.sd * gauge.scale:.2g} {gauge.unit}"
+        percent(gauge.share) if gauge.share else f"{gauge.sd * gauge.scale:.2g} {gauge.unit}"
         for gauge in one.gauges
     )
 

@@ -134,10 +134,10 @@ def _over_keys(data: xr.Dataset, panels: Sequence[tuple[str, Quantity]], style: 
 
 
 def _at_the_fastest(data: xr.Dataset, y: str, x: str) -> xr.Dataset:
-    """The points over two keys, all others being as at the point that is fastest upwards."""
-    known = _values(data, V_AVERAGE).fillna(-np.inf)
-    best: Any = known.argmax(known.dims)
-    others = {name: int(best[name]) for name in data.dims if name not in (x, y)}
+    """The points over two keys, all others being as at the fastest point."""
+    place = next((place for _, place in fastest(data)), 0)
+    best = dict(zip(data[FAILURE].dims, np.unravel_index(place, data[FAILURE].shape), strict=True))
+    others = {name: at for name, at in best.items() if name not in (x, y)}
     return data.isel(others).sortby([x, y]).transpose(y, x)
 
 
