@@ -23,13 +23,15 @@ from cosim.circuit.lint.words import NUMBER, number, word_set
 _SAVING = word_set(".save .probe .probe64 .plot .print .wave")
 _ANALYSES = word_set(".op .ac .dc .tf .noise .disto .pz .sens .sp .four .fourier .csparam")
 _REDUCED = word_set("avg rms min max pp integ")
+_AT = word_set("find deriv")
 _MEAS = re.compile(r"\.meas\w*\s+(?:(tran|ac|dc|op|tf|noise|sp)\s+)?(\w+)\s+(\w+)\b(.*)", re.DOTALL)
 _CLAUSE = re.compile(r"(?<![^\s,)}'])(from|to|at|val|td|cross|rise|fall|when|trig|targ)\b\s*=?\s*")
 _BRACKETS = re.compile(r"\([^()]*\)|\{[^{}]*\}")  # innermost ones
 _LONGEST = 2_000  # characters of a .meas line
 _FORMS = (
-    "it may be AVG, RMS, MIN, MAX, PP or INTEG of an expression with FROM= and TO=, FIND with AT= "
-    "or WHEN, WHEN, TRIG and TARG, of expression=value, TD=, CROSS=, RISE=, FALL=, PARAM of .meas"
+    "it may be AVG, RMS, MIN, MAX, PP or INTEG of an expression with FROM= and TO=, FIND or "
+    "DERIV with AT= or WHEN, WHEN, TRIG and TARG, of expression=value, TD=, CROSS=, RISE=, FALL=, "
+    "PARAM of .meas"
 )
 _CALLS = {name: getattr(math, name) for name in word_set("sqrt exp log log10 pow sin cos")}
 _CALLS |= {"abs": abs, "min": min, "max": max, "ln": math.log}
@@ -119,9 +121,9 @@ def _measure(line: Line, name: str, what: str, rest: str) -> Measure:
     given, events = dict(clauses), [Event()]
     if what in _REDUCED and of and not {*keys} - {"from", "to"}:
         events = [Event(given.get("from", "0")), Event(given.get("to", "1e99"))]
-    elif what == "find" and of and keys == ["at"]:
+    elif what in _AT and of and keys == ["at"]:
         events = [Event(given["at"])]
-    elif keys[:1] == ["when"] and (what == "when" or of):
+    elif keys[:1] == ["when"] and (what == "when" or (what in _AT and of)):
         events = [_event(clauses)]
     elif what == "trig" and "targ" in keys:
         place = keys.index("targ")
@@ -210,7 +212,11 @@ def measured(
         if value is not None:
             values[f"meas.{each.name}"] = value
         else:
-            why = "what it needs has none" if each.what == "param" else "its event does not come"
+            why = (
+                "what it needs has none"
+                if each.what == "param"
+                else "its event or interval is not in the run"
+            )
             notes.append(f"{each.line.place}: .meas {each.name} has no value: {why}.")
     return values, notes
 
@@ -237,7 +243,7 @@ def _value(each: Measure, time: Array, known: Mapping[str, Array]) -> float | No
         return _crossing(time, off, at(event.delay, 0.0), event)
 
     times = [found for event in each.events if (found := when(event)) is not None]
-    if len(times) < len(each.events) or (each.what == "find" and times[0] > time[-1]):
+    if len(times) < len(each.events) or (each.what in _AT and times[0] > time[-1]):
         return None
     if each.what in _REDUCED:
         first, last = max(times[0], float(time[0])), min(times[1], float(time[-1]))
@@ -245,6 +251,8 @@ def _value(each: Measure, time: Array, known: Mapping[str, Array]) -> float | No
         return _reduced(each.what, t, np.interp(t, time, values(each.of))) if first < last else None
     if each.what == "find":
         return at(each.of, times[0])
+    if each.what == "deriv":
+        return float(np.interp(times[0], time, np.gradient(values(each.of), time)))
     return times[-1] - times[0] if each.what == "trig" else times[0]
 
 

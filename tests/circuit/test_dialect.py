@@ -186,6 +186,15 @@ TOLD = {
     "M9 x b 0 0 W 2u 10u\n.model W NMOS": "2u behind the model has no name; write name=value",
     "I9 0 x TBL=(0,0,1,1m)": "tbl is nothing that ngspice knows of it; leave it out",
     "V9 x 0 2*3": "write {…} around its value, 2*3",
+    "V9 x 0 {3}V": "something stands behind the bracket of {3}v; leave it out",
+    "V9 x 0 SIN(2 1 0)": "SIN has no frequency; give one above 0, or its DC value alone",
+    "V9 x 0 SINE() AC 1": "SIN has no frequency; give one above 0, or its DC value alone",
+    ".param e=3\nB9 x 0 V={e}+e*V(in)": "takes e for its own here; give the .param another name",
+    ".param e=3\nE9 x 0 VALUE={{e}*V(in)}": "takes e for its own here; give the .param",
+    ".param limit=3\nB9 x 0 V=limit*V(in)": "takes limit for its own here",
+    "B9 x 0 V=V(in)%2": "% is not known in B sources; for x%y write x-y*floor(x/y)",
+    ".ic I(L9)=1": "there is no inductor l9 here",
+    ".param q=stp(1)\nV9 x 0 {q}": "the function stp works only in B sources",
     "R9 x 0 1k 5%": "5% is neither a model nor name=value; leave it out",
     "C9 x 0 1u x2": "x2 is neither a model nor name=value; leave it out",
     "R9 x 0 4,7k": "has two values; a number has a decimal point",
@@ -193,7 +202,8 @@ TOLD = {
     "(it has r); give it a value in the .subckt line, rr=…",
     "X8 in x w rr=4k\nX9 in x w\n.subckt w a b\nR1 a b {rr}\n.ends": "x9 gives w no rr; write it",
     ".options rawfile=x": "the option rawfile is not allowed in a netlist; leave it out",
-    ".meas tran a DERIV V(in) AT=1m": ".meas a is nothing known here; it may be AVG",
+    ".meas tran a mag V(in) AT=1m": ".meas a is nothing known here; it may be AVG",
+    ".meas tran a AVG V(in) WHEN V(in)=1": ".meas a is nothing known here; it may be AVG",
     ".meas tran a WHEN V(in)": ".meas a is nothing known here; it may be AVG",
     ".meas a": "is no complete .meas",
     ".meas a PARAM odd*2": "the parameter odd is not defined",
@@ -527,6 +537,8 @@ MEASURES = {
     "m12 TRIG V(in) VAL=0.5 RISE=1 TARG V(in) VAL=0.5 FALL=2": 1e-3 + 1e-3 / 3,
     "m13 trig at=0.5m targ v(b)=0.5 td=0.6m rise=1": 1e-3 + 1e-3 / 12 - 0.5e-3,
     "m14 WHEN V(in)=V(b)-0.5 fall=1": 0.5e-3 + np.arcsin(0.25) / (2e3 * np.pi),
+    "m15 DERIV V(in) AT=1.125m": 2e3 * np.pi * np.sqrt(0.5),
+    "m16 DERIV V(b) WHEN V(in)=-0.5 rise=1": -2e3 * np.pi * np.sqrt(0.75),
 }
 MEASURED = (
     "t\n.param t1=1m\nV1 in 0 SIN(0 1 1k)\nBb b 0 V=abs(V(in))\nR1 in 0 1k\nR2 b 0 1k\n"
@@ -545,14 +557,14 @@ def test_measurements_are_those_of_the_program(tmp_path: Path) -> None:
     """In its own form: with =, and no braces."""
     text = MEASURED.replace("FROM 0 TO 2m", "FROM=0 TO=2m").replace("V(in)*2 AT", "V(in) AT")
     text = text.replace("{t1} to='t1+0.1m'", "1m to=1.1m").replace("v(b)=0.5 td", "v(b) val=0.5 td")
-    text = re.sub(r".*m14.*\n", "", text)
+    text = re.sub(r".*m1[46].*\n", "", text)
     summary = summary_of(tmp_path, text)
     path = tmp_path / "alone.cir"
     path.write_text(f"{text}.options reltol=1e-5\n.tran 1u 3m 0 1u\n.end\n")
     command = [str(shutil.which("ngspice")), "-b", str(path)]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     theirs = dict(re.findall(r"^(m\d+)\s*=\s*(\S+)", done.stdout, re.MULTILINE))
-    assert len(theirs) == 13
+    assert len(theirs) == 14
     for name, value in theirs.items():
         # An interval ends for it at the last point within.
         near = 1e-2 if name == "m4" else 1e-3
@@ -570,9 +582,8 @@ def test_a_measurement_may_be_computed_from_others(tmp_path: Path) -> None:
     true = {"meas.rms": 0.5**0.5, "meas.ratio": 1.0, "meas.size": 3**0.5 + 0.01}
     assert given == pytest.approx(true, rel=1e-4)
     whys = [note.partition("has ")[2] for note in summary["notes"]]
-    assert (
-        whys == ["no value: its event does not come."] + ["no value: what it needs has none."] * 2
-    )
+    missing = "no value: its event or interval is not in the run."
+    assert whys == [missing] + ["no value: what it needs has none."] * 2
 
 
 def test_an_event_that_does_not_come_has_no_value(tmp_path: Path) -> None:
@@ -581,7 +592,7 @@ def test_an_event_that_does_not_come_has_no_value(tmp_path: Path) -> None:
     time = np.linspace(0, 1, 11)
     for each in measures(read_all(path)[1]):
         values, (note,) = measured([each], time, {word: np.sin(time) for word in each.words})
-        assert not values and "its event does not come" in note
+        assert not values and "its event or interval is not in the run" in note
     summary = summary_of(tmp_path, path.read_text().removesuffix(".end\n"))
     assert not [key for key in summary if key.startswith("meas")]
     assert [note for note in summary["notes"] if "own.cir:8: .meas x has no value" in note]

@@ -111,6 +111,7 @@ STATIC: dict[str, dict[str, Callable[[Array, Array], Array]]] = {
         "v(c)": lambda x, t: np.where(x > 0, x**2, -0.5 * x),
         "v(d)": lambda x, t: np.interp(x, [-0.5, 0, 0.5], [-1, 0, 2]),
         "v(e)": lambda x, t: np.hypot(x, np.sin(2e3 * np.pi * t)),
+        "v(g)": lambda x, t: np.arctan2(x, np.cos(2e3 * np.pi * t)),
         "v(f)": lambda x, t: np.where(x > 0.5, 2.0, np.where(x < 0.125, 1.0, 0.0)),
     },
     "PSpice: tables and expressions": {
@@ -182,13 +183,16 @@ def test_edges_without_times_currents_and_truth_are_as_the_netlist_has_them(
     tmp_path: Path,
 ) -> None:
     """An edge of PULSE without a length takes the netlist's .tran step, as in ngspice alone, not
-    the scene's, but no more than 1 % of the pulse; a resistor's current is read in save and .meas;
-    0.2 is false to LTspice."""
+    the scene's, but no more than 1 % of the pulse, and one without an on-time falls at once; a
+    resistor's current is read in save and .meas; 0.2 is false to LTspice."""
     text = """own step
 V1 in 0 SIN(0 1 1k)
 R1 in 0 1k
 V2 p 0 PULSE(0 5 0 0 0 250u 0.5m)
 RLoad p 0 1k
+V4 saw 0 PULSE(0 1 0 {edge} 0.25m 0 0.5m)
+.param edge=0.25m
+R4 saw 0 1k
 V3 low 0 0.2
 R3 low N/C_01 1k
 B1 high 0 V={if(V(low),5,unit)}
@@ -201,12 +205,15 @@ B3 there 0 V={far}
 .tran 5u 3m
 .end
 """
-    result = found(tmp_path, "", text, "v(p)", "i(RLoad)", "v(high)", "v(both)", "v(there)")
+    words = ("v(p)", "i(RLoad)", "v(high)", "v(both)", "v(there)", "v(saw)")
+    result = found(tmp_path, "", text, *words)
     time, pulse = result.columns["time"], result.columns["v(p)"]
     phase = time % 0.5e-3
     rising = (phase > 0.1e-6) & (phase < 2.4e-6)
     assert pulse[rising] == pytest.approx(phase[rising] * 2e6, abs=1e-6)  # 5 V in 2.5 us
     assert result.columns["i(RLoad)"] == pytest.approx(pulse / 1e3, abs=1e-9)
+    triangle = 1.0 - np.abs(phase - 0.25e-3) / 0.25e-3
+    assert result.columns["v(saw)"] == pytest.approx(triangle, abs=1e-5)
     assert np.all(result.columns["v(high)"] == 1.0)
     assert np.all(result.columns["v(both)"] == 11.0)
     # Not what .step begins with; ngspice rounds parameters.

@@ -153,6 +153,7 @@ B4 d 0 V=table(V(in),-0.5,-1,0,0,0.5,2)
 B6 f 0 V=2*buf(V(in))+inv(4*V(in))
 B5 0 e I=1m*hypot(V(in),sin(w*time))
 R5 e 0 1k
+B7 g 0 V=atan2(V(in),cos(w*time))
 .tran 3m
 .end
 """,
@@ -162,7 +163,8 @@ V1 in 0 SIN(0 1 1k)
 E1 a 0 VALUE {LIMIT(2*V(in), -1, 1)}
 ETAB b 0 TABLE {V(in)-0.1} = (-5m,0) (5m,{VHIGH})
 GTAB 0 c TABLE {V(in)} = (-1,-1m) (-.5,0) (.5,0) (1,1m)
-RC c 0 1K
+RC c $N_0001 1K
+VC $N_0001 0 0 $ of no use
 H1 d 0 POLY(1) VS 0 1K 1MEG
 VS b e 0
 RS e 0 10K

@@ -11,7 +11,7 @@ from cosim.circuit.lint.elements import MODEL_TYPES, Element, Scope, parse
 from cosim.circuit.lint.expressions import Names, body, check_circles, check_names, sensed, unbraced
 from cosim.circuit.lint.lines import COPY, Line, refuse, shown
 from cosim.circuit.lint.topology import check_topology
-from cosim.circuit.lint.words import number, word_set
+from cosim.circuit.lint.words import closing, number, word_set
 
 REQUIRED = (("vemf", "vcommand"), ("vemf", "vdac", "voffset"))
 """Alternatives, each a set of top-level voltage sources that a co-simulation can replace."""
@@ -185,6 +185,8 @@ def _check_source(element: Element, scope: Scope, names: Names) -> None:
                 f": {wave.upper()} takes {most} values; leave out the next, a number of periods to "
                 "LTspice and a phase to ngspice, or write that many as PWL"
             )
+        if wave == "sin" in element.words and number([*_values(after), "0", "0", "0"][2]) == 0.0:
+            element.refuse(": SIN has no frequency; give one above 0, or its DC value alone")
     if "pwl" in element.words:
         after = element.words[element.words.index("pwl") + 1 :]
         if any(word.startswith("+") for word in after[::2]):
@@ -198,6 +200,8 @@ def _check_source(element: Element, scope: Scope, names: Names) -> None:
         plain = word.lstrip("+-")
         if _OPERATOR.search(unbraced(word)):
             element.refuse(f": write {{…}} around its value, {shown(word)}")
+        if plain[:1] in ("{", "'") and closing(plain, 0) < len(plain):
+            element.refuse(f": something stands behind the bracket of {shown(word)}; leave it out")
         known = plain in _WAVEFORMS or names.is_parameter(scope, plain)
         if known or "=" in word or _NUMBER.match(word) or plain[:1] in ("{", "'", ""):
             continue

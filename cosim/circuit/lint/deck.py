@@ -37,7 +37,7 @@ KEPT = word_set(
 DROPPED = word_set(
     ".tran .op .ac .dc .tf .noise .disto .pz .sens .sp .four .fourier .meas .measure .save .print "
     ".plot .step .wave .probe .probe64 .width .title .csparam .backanno .prot .unprot .protect "
-    ".unprotect"
+    ".unprotect .autoconverge .net .savebias"
 )
 """Analyses, output and remarks: a host sets its own; see ``outputs.py``."""
 ELEMENTS = frozenset("bcdefghijklmoqrstvwxz")
@@ -51,10 +51,10 @@ NUMERIC_OPTIONS = word_set(
     "xmu"
 )
 DROPPED_OPTIONS = word_set(
-    "acct accurate advconv autostop brief cptime fastaccess filetype flagloads ingold interp "
-    "limpts limtim list lvltim maxstep meascplxfmt measdgt noacct node noinit nomarch nomod "
-    "nopage numdgt opts plotabstol plotreltol plotvntol plotwinsize post probe savecurrents "
-    "runlvl srcstepmethod stepgmin thev_induc topologycheck warn width wnflag"
+    "acct accurate advconv autostop baudrate brief cptime fastaccess filetype flagloads ingold "
+    "interp limpts limtim list lvltim maxstep meascplxfmt measdgt noacct node noinit nomarch nomod "
+    "nopage noprobe numdgt opts plotabstol plotreltol plotvntol plotwinsize post probe runlvl "
+    "savecurrents skipbp srcstepmethod stepgmin thev_induc topologycheck warn width wnflag"
 )
 """Options for output, which a host sets (``interp`` gives wrong waveforms), or other programs'."""
 
@@ -79,6 +79,7 @@ _UNSAFE = re.compile(r'["`\\]')
 _FILE_WORD = re.compile(r"\b(?:\w*_)?(?:file|filename|wavefile)\b", re.IGNORECASE)
 _COMMAND_COMMENT = re.compile(r"\*\s*(?:#\s*[\w!/.]|ng_script)", re.IGNORECASE)
 _TRAILING = re.compile(r";|//|(?:^|(?<=[\s,]))\$")  # begins a comment; "$" only between words
+_NUMBERED = re.compile(r"(?<![\w.])\$(?=n_\d)", re.IGNORECASE)  # begins PSpice's own nodes
 # A name, perhaps with "=" and a value in braces, quotes or bare.
 _OPTION = re.compile(r"([a-z_]\w*)(?:\s*=\s*(\{[^{}]*\}|'[^']*'|[\w.+-]+))?[\s,]*", re.IGNORECASE)
 # The model's type, or "ako:BASE" with a type that may follow it.
@@ -377,6 +378,7 @@ def _without_comment(line: Line) -> str:
         if _COMMAND_COMMENT.match(content):
             refuse(line, "a comment that begins with *# or *ng_script is a command to ngspice")
         return ""
+    content = _NUMBERED.sub("", content)
     end = _TRAILING.search(content)
     return " ".join((content[: end.start()] if end else content).split())
 

@@ -8,6 +8,7 @@ not installed on every machine, take time in each step, and round a table's corn
 """
 
 import re
+from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import reduce
@@ -46,6 +47,12 @@ FUNCTIONS = {
     "buf": ("x", "u(x-0.5)"),
     "inv": ("x", "u(0.5-x)"),
     "hypot": ("x,y", "sqrt(x*x+y*y)"),
+    "atan2": (
+        "y,x",
+        "ternary_fcn(x>=0,1,-1)*atan(y/(abs(x)+1e-99))"
+        "+ternary_fcn(x>=0,0,ternary_fcn(y<0,-1,1)*3.141592653589793)",
+    ),
+    "fabs": ("x", "abs(x)"),
     "cosim_switch": ("c,n,f,r,q", f"exp(-0.5*ln(r*q)-ln(r/q)*{_WAY}*(1.5-2*{_WAY}**2))"),
     "cosim_diode": ("x,f,b,r,q,d", "x/q+max(x-f,0)*(1/r-1/q)-max(-x-b,0)*(1/d-1/q)"),
 }
@@ -103,6 +110,12 @@ _CHANGING = re.compile(r"\b(?:[vi]\s*\(|time\b)", re.IGNORECASE)
 _MEMORY = re.compile(r"(?<![\w.])(idt|sdt|delay)\s*\(", re.IGNORECASE)
 _COILS = re.compile(r"(k\S*)((?:\s+l\S*){3,})\s+(\S+)", re.IGNORECASE)  # K of three or more
 _PWL = re.compile(r"(\bpwl\b[\s(]*)([^()]*)", re.IGNORECASE)
+# PULSE up to an on-time of 0, with the times of rise and fall as groups.
+_NO_WIDTH = re.compile(
+    rf"(\bpulse[\s(]+(?:(?:{_VALUE[1:-1]})[\s,]+){{3}}{_VALUE}[\s,]+{_VALUE}[\s,]+)"
+    r"0(?:\.0*)?[a-z]*(?![\w.])",
+    re.IGNORECASE,
+)
 _WORD = re.compile(r"[^\s,]+")
 # NAME VALUE in a .param line without equals signs.
 _UNEQUAL = re.compile(r"(?<=\s)([a-z_]\w*)\s+(?=[{'\d.+-])", re.IGNORECASE)
@@ -231,6 +244,9 @@ def in_ngspice_together(lines: Sequence[Line]) -> list[Line]:
     scopes, lines = [*_scopes(lines)], [*lines]
     _complete(lines, scopes)
     known: dict[_Key, str] = {}
+    names = defaultdict[_Key, set[str]](set)
+    for line, scope in zip(lines, scopes, strict=True):
+        names[scope].add(line.text.split(None, 1)[0].lower())
     for place, (line, scope) in enumerate(zip(lines, scopes, strict=True)):
         text = line.text.lower()
         if match := _SWITCHING.match(text):
@@ -240,7 +256,10 @@ def in_ngspice_together(lines: Sequence[Line]) -> list[Line]:
             if law:
                 lines[place] = replace(line, text=told and f".told {told}")
         elif text.startswith(".ic"):
-            known |= {(scope, each[1]): each[2] for each in _CURRENT.finditer(text)}
+            for name, current in _CURRENT.findall(text):
+                if name not in names[scope]:
+                    refuse(line, f"there is no inductor {shown(name)} here")
+                known[scope, name] = current
             lines[place] = replace(line, text=_CURRENT.sub("", line.text).strip())
     apart = (_apart(*each, known) for each in zip(lines, scopes, strict=True))
     return [line for line in chain(*apart) if line.text.lower() not in ("", ".ic")]
@@ -360,6 +379,12 @@ def _without_tables(text: str) -> str:
     return text
 
 
+def _with_width(match: re.Match[str]) -> str:
+    """A match of ``_NO_WIDTH`` with an on-time that is short beside its edges."""
+    rise, fall = (value.strip("{}'") for value in match.groups()[1:])
+    return f"{match[1]}{{1e-6*max({rise}+{fall},1n)}}"
+
+
 def _compared(match: re.Match[str]) -> str:
     """A match of ``_EQUAL`` as a comparison with a tolerance."""
     parameter, how, value = match.groups()
@@ -414,6 +439,8 @@ def _with_parts(text: str, kind: str) -> Iterator[str]:
     name, plus, minus, rest = found
     if kind in "vi":
         rest = re.sub(r"(?i)\bsine\b", "sin", rest)
+        # An on-time of 0 lasts to the end of the run in ngspice.
+        rest = _NO_WIDTH.sub(_with_width, rest)
         rest = _PWL.sub(lambda pwl: pwl[1] + since_the_start(_WORD.findall(pwl[2])), rest)
     elif kind in "rcl":
         rest = _SPLIT_NUMBER.sub(r"\1.\3\2", rest)

@@ -34,6 +34,7 @@ MOST_CALLS, DEEPEST = 10_000, 100
 """Limits of the calls that a call expands to, and of their nesting; ngspice 39 takes 0.15 s."""
 CONSTANTS = word_set("time temper hertz")
 BEHAVIOURAL_CONSTANTS = word_set("pi e i s")
+_TAKEN = (BEHAVIOURAL_CONSTANTS | frozenset(BEHAVIOURAL)) - {"pi"}
 
 _LIMITER = "limit() is no limiter in ngspice; write max(low, min(high, x))"
 _MEMORY = (
@@ -156,7 +157,10 @@ class Names:
             if inner in self.definitions:
                 self.check_own(function.line, inner, given, behavioural, depth + 1)
             elif reason := _misused(inner, given, behavioural):
-                refuse(function.line, reason)
+                # Line 1, the title, stands for functions that the dialect has added.
+                added = function.line.number == 1
+                where = f"the function {name} works only in B sources" if added else reason
+                refuse(line if added else function.line, where)
         # The functions that it calls are counted by now, but for itself, if it is recursive.
         self.calls[name] = 1 + sum(self.calls.get(inner, 0) for inner, _ in calls)
         if self.calls[name] > MOST_CALLS:
@@ -189,12 +193,24 @@ def check_names(scope: Scope, names: Names) -> None:
                     names.check_own(line, name, arguments, behavioural)
                 elif reason := _misused(name, arguments, behavioural):
                     refuse(line, reason)
+            if in_source:
+                in_b = element is not None and element.kind == "b"  # where {e} is the .param
+                _check_source(line, unbraced(expression) if in_b else expression, parameters)
             _check_operators(line, expression)
             pieces = "".join(str(piece.lastgroup)[0] for piece in _PIECE.finditer(expression))
             if pieces and (_BROKEN.search(pieces) or len(split_arguments(expression)) > 1):
                 refuse(line, f"{shown(expression.strip())} is no expression that ngspice can read")
         if element is not None and element.kind == "b":
             _check_blanks(line, own)
+
+
+def _check_source(line: Line, expression: str, parameters: set[str]) -> None:
+    """Refuse what ngspice takes for something else, or cannot read, in a behavioural source."""
+    if "%" in expression:
+        refuse(line, "% is not known in B sources; for x%y write x-y*floor(x/y)")
+    for name, arguments in used(expression):
+        if arguments is None and name in parameters & _TAKEN:
+            refuse(line, f"ngspice takes {name} for its own here; give the .param another name")
 
 
 def _check_operators(line: Line, expression: str) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 
 from cosim.circuit.lint.deck import MOS_LEVELS, Line, refuse, shown
 from cosim.circuit.lint.elements import Element
-from cosim.circuit.lint.words import NUMBER, definitions, word_set, words
+from cosim.circuit.lint.words import NUMBER, closing, definitions, word_set, words
 
 _NAME = re.compile(r"[a-z_][\w.$#]*", re.IGNORECASE)
 _NODES = re.compile(r"[vi]\s*\([^(){}=']*\)", re.IGNORECASE)
@@ -91,7 +91,7 @@ def _element(element: Element) -> str:
     found = [match[1].lower() for match in map(_KEY.match, element.words) if match]
     for key in found if known is not None else ():
         if key not in word_set(known or ""):
-            cure = _ELSEWHERE.get(key, "leave it out")
+            cure = _ELSEWHERE.get(key, "leave it out if the circuit is the same without it")
             element.refuse(f": {shown(key)} is nothing that ngspice knows of it; {cure}")
     head = [element.name, *element.nodes, *element.controls]
     head += [element.model] if element.model else []
@@ -133,7 +133,7 @@ def _word(line: Line, word: str) -> str:
     """A value, or ``key=value``."""
     if pair := _PAIR.fullmatch(word):
         return f"{pair[1]}={_word(line, pair[2])}"
-    if word[0] in "{'":
+    if word[0] in "{'" and closing(word, 0) == len(word):
         return _expression(line, word)
     sign = word[: word[0] in "+-"]
     if number := NUMBER.fullmatch(word, len(sign)):
