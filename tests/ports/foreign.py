@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 from fmpy import platform, sharedLibraryExtension
 
 _REALS = (
-    ("u", 0, "input", 'start="0"', "N.m"),
+    ("u", 0, "input", 'start="0"', ""),
     ("omega", 1, "output", "", "rad/s"),
     ("J", 2, "parameter", 'start="2e-4"', "kg.m2"),
     ("B", 3, "parameter", 'start="1e-4"', ""),

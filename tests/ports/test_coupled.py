@@ -422,7 +422,10 @@ def test_outputs_that_settle_do_not_move_in_steps_of_their_own(tmp_path: Path) -
     result = here(tmp_path / "load.toml", given)
     still = np.diff(result.columns["load.v"]) == 0.0
     assert 0.5 < still.mean() < 0.99 and still[-100:].all()
-    assert result.summary["notes"] == []
+    told = "a [[port]] leads load.v [m/s] to Vf [V] without a scale."
+    assert result.summary["notes"] == [told]
+    reworded(tmp_path / "Load.fmu", ('unit="m/s"', 'unit="V"'))
+    assert here(tmp_path / "load.toml", given).summary["notes"] == []
 
 
 def test_an_event_of_an_fmu_is_found(tmp_path: Path) -> None:

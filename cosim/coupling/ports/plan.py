@@ -1,5 +1,6 @@
 """A scene's ports, checked against its FMUs and brought into the numbers of ``ports.c``."""
 
+import re
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
 from itertools import accumulate
@@ -7,16 +8,18 @@ from pathlib import Path
 from typing import Any
 
 from cosim.circuit import netlist
-from cosim.circuit.joined import Deck, deck
+from cosim.circuit.joined import Deck, deck, unit
 from cosim.coupling.loop.structures import DRIVE, OUTPUT, PROBE, Feed, Origin, Source, Through
 from cosim.coupling.ports.sides import Side
 from cosim.coupling.ports.strangers import Variable, stranger
+from cosim.errors import plain
 from cosim.mechanics.package import unpacked
 from cosim.mechanics.stickslip import parameters
 from cosim.scene import Scene
 from cosim.scene.tables import MACHINE, MACHINE_ENDS, Fmu, Port
 
 _HELD, _DIFFERENCE, _KNOWN = range(3)  # slope of an output between communication points
+_UNKNOWN = {"1", "?", ""}  # what a variable or an expression has that tells no unit
 _FEEDS = {"mean": 0, "line": 1, "end": 2}
 
 _Of = tuple[str, str]
@@ -60,6 +63,7 @@ class Plan:
         for side in sides.values():
             for output, inputs in side.of.feedthrough.items():
                 self._needs[side.name, output] = {(side.name, name) for name in inputs}
+        self.notes: list[str] = []
         for port in ports:
             self._join(port, sides)
         # Each FMU's outputs are a part of one row. Reported slopes lengthen the parts, so the
@@ -80,7 +84,7 @@ class Plan:
         """Places of outputs that feed an FMU which steps before their own FMU."""
         through, circle = self._feedthrough(), _circle(self._needs)
         self.method = _method(scene, self.sides, through, circle)
-        self.notes = [*_notes(scene, self.sides, self.method, through, circle)]
+        self.notes += _notes(scene, self.sides, self.method, through, circle)
         self.throughs = [*self._throughs()] if self.method == "redo" else []
         """Feedthrough from a probe to a source, which the circuit solves itself, and its feed."""
 
@@ -138,23 +142,27 @@ class Plan:
     def _join(self, port: Port, sides: dict[str, Side]) -> None:
         """Add a port: its origin (probe, drive or output), and what it feeds (source or input)."""
         origin = Origin(scale=port.scale, offset=port.offset)
-        side, output = None, None
+        side, output, given = None, None, "V"
         if port.probe is not None:
             origin.kind, origin.place = PROBE, self.words.index(port.probe)
+            given = unit(port.probe)
         elif port.origin == "drive":
             origin.kind = DRIVE
         else:
             side, output, place = _end(port, "from", str(port.origin), sides, "output")
             origin.kind, origin.place = OUTPUT, side.places[output.name] + place
+            given = output.unit
             _set_slope(origin, port, side, output, place)
         if port.source is not None:
             self.names.append(port.source)
+            taken = "V" if port.source[0] in "vV" else "A"
             self.sources.append(Source(name=port.source.lower().encode(), origin=origin))
             if side is not None and output is not None and output.real:
                 self._fed.append((len(self.sources) - 1, side, output))
             kept = self.sources[-1].origin  # a copy of ``origin``, which is adjusted later
         else:
             into, variable, place = _end(port, "to", str(port.to), sides, "input")
+            taken = variable.unit
             able = into.of.version == 2 and into.of.abilities.canInterpolateInputs
             able = able and variable.size == 1
             if port.feed == "line" and variable.real and not able:
@@ -170,10 +178,18 @@ class Plan:
             if side is not None and output is not None:
                 needs = self._needs.setdefault((into.name, variable.name), set())
                 needs.add((side.name, output.name))
+        if port.scale == 1.0 and _alike(given) != _alike(taken) and not {given, taken} & _UNKNOWN:
+            ends = f"{port.origin or port.probe} [{given}] to {port.source or port.to} [{taken}]"
+            self.notes.append(f"a [[port]] leads {plain(ends)} without a scale.")
         if side is not None:
             self._from.append((side, kept))
             if port.slope == "auto" and kept.slope == _KNOWN:
                 self.told.append((side, str(port.origin), kept))
+
+
+def _alike(unit: str) -> str:
+    """A unit whose products are written in one of the ways that tools have for them."""
+    return re.sub(r"[\s.*·]", "", unit)
 
 
 def _machine(scene: Scene) -> Fmu:
