@@ -49,6 +49,8 @@ class Deck:
     """For each word the device parameter that has its value within a step; "" without one."""
     pulses: tuple[str, ...]
     """ngspice's names of the sources with PULSE."""
+    edge: float | None
+    """Length, s, of edges of PULSE that have none."""
 
 
 def unit(words: str) -> str:
@@ -104,9 +106,9 @@ def deck(
     external = {
         each.line: "\n".join(_external(each, through)) for each in top.elements if each.name in fed
     }
-    read_as = reading(every, len(words) if asked else 0)
+    read_as, own = reading(every, len(words) if asked else 0), own_step(dropped)
     return Deck(
-        text_of(lines[0], top, external, values, duration, reltol, max_step, own_step(dropped)),
+        text_of(lines[0], top, external, values, duration, reltol, max_step, own),
         {source.lower(): source[0].lower() for source in sources},
         tuple(vector for vector, _ in read_as),
         tuple(every),
@@ -114,6 +116,7 @@ def deck(
         tuple(without_effect(dropped)),
         tuple(device if k < len(words) else "" for k, (_, device) in enumerate(read_as)),
         tuple(_pulses(top, fed)),
+        _edge(top, own, max_step, duration),
     )
 
 
@@ -135,14 +138,20 @@ def own_step(dropped: Sequence[Line]) -> float | None:
     return None
 
 
-def _edges(step: float, sources: Iterable[Sequence[str]]) -> float:
-    """The length, s, of edges whose rise or fall time is not given. Simulators differ in it; here
-    it is a step, but at most 1 % of the shortest on-time or period of a PULSE."""
-    lengths = [step]
+def _edge(top: Scope, own: float | None, max_step: float, duration: float) -> float | None:
+    """The length, s, of edges whose rise or fall time is not given; None without PULSE and EXP.
+    Simulators differ in it; here it is the netlist's ``own`` step, or a run's longest, but at most
+    1 % of the shortest on-time or period of a PULSE, or without ``own`` of the run's longest step
+    where an expression has one of these."""
+    sources = [element.words for _, element, _ in top.order if element and element.kind in "vi"]
+    if not any({"pulse", "exp"} & {*words} for words in sources):
+        return None
+    lengths = [own or max_step, duration]
     for words in sources:
         if "pulse" in words:
             values = [number(word) for word in words[words.index("pulse") + 1 :]]
             lengths += [0.01 * value for value in values[5:7] if value]  # on-time and period
+            lengths += [0.01 * max_step] * (None in values[5:7] and own is None)
     return min(lengths)
 
 
@@ -166,9 +175,7 @@ def text_of(
         elif all(each.used for each in holder.chain()):  # something calls the subcircuit
             free = (f" {key}=0" for key in sorted(holder.free) if line is holder.line)
             text.append("".join([written(line, element, values if holder is top else {}), *free]))
-    sources = [element.words for _, element, _ in top.order if element and element.kind in "vi"]
-    edges = any({"pulse", "exp"} & {*words} for words in sources)
-    step = min(_edges(own or max_step, sources), duration) if edges else max_step
+    step = _edge(top, own, max_step, duration) or max_step
     min_break = max(_ONE_BREAK * max_step, _ONE_TIME * duration)
     text += [
         # Without norefvalue ngspice reads the CPU time at each step, to print its progress.

@@ -459,6 +459,8 @@ V1 o 0 PULSE(0 1 0 {edge} {edge} {per/2-edge} {per})
 .ends
 X1 p pw
 V2 q 0 PULSE(0 1 {per/4} {per/2} {per/2} 0 {per})
+V3 z 0 PULSE(0 1 0 0 0 {per/2} {per})
+R3 z 0 1
 R1 p x 1
 L1 x y 1m
 R2 q 0 1
@@ -481,6 +483,7 @@ def test_no_edge_of_a_pulse_is_lost(tmp_path: Path, period: float) -> None:
         + [starts + share * period for share in (0.25, 0.75)]
     )
     for step in (1e-6, 2e-6, 5e-6, 1e-5, 2e-5):
+        edges = np.concatenate([starts + at for at in (0.01 * step, period / 2 + 0.02 * step)])
         for macro in (None, 1e-5, 2e-5, 2.5e-5, 3e-5, 5e-5, 1e-4, 2e-4):
             given = {"circuit.param.per": period, "circuit.max_step": step}
             given |= {"run.duration": duration, "run.settle": 0.0}
@@ -490,7 +493,8 @@ def test_no_edge_of_a_pulse_is_lost(tmp_path: Path, period: float) -> None:
                 run = Run(load(scene, given), lambda _: None)
                 run.run()
             times = run.log.column()
-            nearest = np.abs(times[np.searchsorted(times, corners - 1e-12)] - corners)
+            every = np.concatenate([corners, edges])
+            nearest = np.abs(times[np.searchsorted(times, every - 1e-12)] - every)
             assert nearest.max() < 1e-11, (step, macro)
 
 

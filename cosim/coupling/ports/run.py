@@ -209,7 +209,7 @@ class Run:
         state.announce = engine.address("ngSpice_SetBkpt")
         found = [engine.ask(f"@{name}[pulse]") for name in self.deck.pulses]
         pulses = [
-            _pulse(values, run.duration, self._scene.circuit.max_step)
+            _pulse(values, run.duration, self.deck.edge or 0.0)
             for values in found
             if len(values) > 2
         ]
@@ -245,12 +245,13 @@ class Run:
             )
 
 
-def _pulse(values: list[float], duration: float, step: float) -> Any:
+def _pulse(values: list[float], duration: float, edge: float) -> Any:
     """A PULSE source's corners in a period (s), from ngspice's values (low, high, delay, rise,
-    fall, width, period) with ngspice's defaults for those not given."""
+    fall, width, period) with ngspice's defaults for those not given: the length of an ``edge``, and
+    the run's."""
     given = dict(enumerate(values))
     delay, rise, fall = (given.get(k, 0.0) for k in (2, 3, 4))
-    rise, fall = rise or step, fall or step
+    rise, fall = rise or edge, fall or edge
     width = given.get(5) or duration
     period = given.get(6) or 2.0 * (duration + rise + width + fall)
     corners = [0.0, rise, rise + width, rise + width + fall]
