@@ -19,7 +19,7 @@ from cosim.evaluate.evaluator import Evaluator
 from cosim.scene import load
 from cosim.search.known import apart
 from cosim.studies.limits.changes import CHANGES, STEPS, Change
-from cosim.studies.limits.judge import judged
+from cosim.studies.limits.judge import Key, judged
 from cosim.studies.limits.runs import GOALS, NEEDED, Bench
 from cosim.studies.limits.study import ensemble
 
@@ -59,7 +59,7 @@ def searched(bench: Bench, change: Change, number: int, kind: str, seed: int) ->
     best = points[apart(points, APART, JUDGED)].tolist()
     candidates = {kind: [best if k == number else [] for k in range(len(GOALS))]}
     found = judged(bench, {change.name: machine}, {change.name: candidates}, (kind,))
-    point = found.get((change.name, goal.name, kind))
+    point = found.get(Key(change.name, goal.name, kind))
     return point.rank(kind) * goal.scale if point else 0.0
 
 

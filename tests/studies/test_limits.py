@@ -165,7 +165,7 @@ def test_search_finds_what_an_exhaustive_grid_finds() -> None:
                 mine, allowed = scores(np.array(found[kind][n][:1]))
                 assert allowed.all() and mine[0, n] >= 0.95 * best[n], (kind, goal.name)
         points = judge.judged(made, {"": machine}, {"": found}, ("robust",))
-    up = points["", "v_up", "robust"]
+    up = points[Key("", "v_up", "robust")]
     assert 0.0 < up.worst <= up.median and up.heat <= machine.heat
     monolithic = pytest.importorskip("tests.reference.monolithic")
     values = {key.split(".")[1]: value for key, value in up.settings.items()}
@@ -246,7 +246,7 @@ def test_what_is_not_settled_does_not_stand() -> None:
                 [Machine().at(np.array(place[0]), *times) for times in ((1.5, 1.5), (2.25, 0.75))]
             )
             for key, point in points.items():
-                values = [runs.scored(x)[judge.NUMBER[key[1]]] for x in (whole, late)]
+                values = [runs.scored(x)[judge.NUMBER[key.goal]] for x in (whole, late)]
                 assert abs(values[1] / values[0] - 1.0) <= 0.01 and point.value == values[0]
 
 
@@ -258,7 +258,7 @@ def made_study(
 
     def points(as_it_is: float, sine: float) -> dict[Key, Point]:
         return {
-            (name, "v_up", "robust"): Point(value, value, value, 1.0, value, 50.0, [], {})
+            Key(name, "v_up", "robust"): Point(value, value, value, 1.0, value, 50.0, [], {})
             for name, value in (("as it is", as_it_is), ("sine", sine))
         }
 
@@ -360,7 +360,7 @@ def test_what_is_not_searched_is_tried_at_the_robust_setting(
     monkeypatch.setattr(judge, "SPAN", 0.03)
     made, place, slow = bench(), [0.6, 0.8, 0.2], "op-amp of a hundredth the slew rate"
     own = {
-        ("as it is", "v_up", kind): Point(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, place, {})
+        Key("as it is", "v_up", kind): Point(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, place, {})
         for kind in ("best", "robust")
     }
     machines = {name: NAMED[name].machine(made.scene) for name in ("as it is", slow)}

@@ -95,7 +95,7 @@ def differences(study: Study, goal: Goal) -> list[float]:
     for number, points in study.repeats:
         for key, point in points.items():
             first = study.rigs[number].points.get(key)
-            if first is not None and key[1:] == (goal.name, "robust"):
+            if first is not None and (key.goal, key.kind) == (goal.name, "robust"):
                 found.append(abs(point.median / first.median - 1.0))
     return found or [0.0]
 

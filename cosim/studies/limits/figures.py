@@ -73,7 +73,7 @@ def settings(study: Study) -> Picture:
     title = "The largest acceleration does not carry the part fastest"
     figure, (axis,) = panels(title, note, (9.0, 5.4))
     for rank, (name, color) in enumerate(COLORS.items()):
-        some = [point for key, point in points.items() if group[key[0]] == name]
+        some = [point for key, point in points.items() if group[key.change] == name]
         words = name or AS_IT_IS.name
         velocity = [point.v_average * 1e3 for point in some]
         reading = [point.a_camera for point in some]

@@ -8,6 +8,7 @@ not settled. The best settled candidate that is feasible represents its machine.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import nan
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,8 +31,13 @@ SETTLED = 0.01
 NUMBER = {goal.name: number for number, goal in enumerate(GOALS)}
 """The index of each goal in the scores."""
 
-Key = tuple[str, str, str]
-"""Names of a change, a goal and a kind."""
+
+class Key(NamedTuple):
+    """The names of the change, goal and kind (of KINDS) that a point represents."""
+
+    change: str
+    goal: str
+    kind: str
 
 
 @dataclass(frozen=True)
@@ -76,7 +82,7 @@ def judged(
     """For each machine, goal and kind of ``kinds`` the best candidate that is settled and feasible;
     no entry where no candidate is, or where none has a positive rank."""
     asked = [
-        ((name, goal.name, kind), np.array(point))
+        (Key(name, goal.name, kind), np.array(point))
         for name, by_kind in candidates.items()
         for kind in kinds
         for goal, points in zip(GOALS, by_kind[kind], strict=True)
@@ -84,12 +90,12 @@ def judged(
     ]
     good = _settled(bench, machines, asked)
     # The first of the points around p, and so of each group of runs, is p itself.
-    runs = [[machines[key[0]].at(one, SETTLE, SPAN) for one in around(p)] for key, p in good]
+    runs = [[machines[key.change].at(one, SETTLE, SPAN) for one in around(p)] for key, p in good]
     found: dict[Key, Point] = {}
     for (key, middle), settings, outcomes in zip(good, runs, bench.outcomes(runs), strict=True):
-        point = _point(key[1], middle.tolist(), outcomes, settings[0])
+        point = _point(key.goal, middle.tolist(), outcomes, settings[0])
         best = found.get(key)
-        if point.rank(key[2]) > (best.rank(key[2]) if best else 0.0):
+        if point.rank(key.kind) > (best.rank(key.kind) if best else 0.0):
             found[key] = point
     return found
 
@@ -102,14 +108,14 @@ def _settled(bench: Bench, machines: Mapping[str, Machine], asked: _Asked) -> _A
     each machine and goal, since their turns need not be run."""
     # The last half and the last quarter of the same motion, if this has settled.
     times = (SETTLE, SPAN), (SETTLE + SPAN / 2.0, SPAN / 2.0)
-    runs = [[machines[key[0]].at(point, *each) for each in times] for key, point in asked]
+    runs = [[machines[key.change].at(point, *each) for each in times] for key, point in asked]
     found: _Asked = []
     top: dict[Key, float] = {}
     for (key, point), pair in zip(asked, bench.outcomes(runs), strict=True):
-        values = [scored(outcome)[NUMBER[key[1]]] for outcome in pair]
-        if not bench.feasible(machines[key[0]], pair[0]) or relative_error(*values) > SETTLED:
+        values = [scored(outcome)[NUMBER[key.goal]] for outcome in pair]
+        if not bench.feasible(machines[key.change], pair[0]) or relative_error(*values) > SETTLED:
             continue
-        if key[2] != "best":
+        if key.kind != "best":
             found.append((key, point))
         elif values[0] > top.get(key, 0.0):
             top[key] = values[0]
@@ -133,7 +139,7 @@ def confirmed(
     """The points with their value on a circuit that ngspice solves: the amplifier, or the whole
     schematic where the current limit acts, which the amplifier lacks."""
     fidelity, own = Fidelity.of(bench.scene), bench.scene.circuit.current_limit
-    asked = {key: point for key, point in points.items() if machines[key[0]].rung == SEARCHES}
+    asked = {key: point for key, point in points.items() if machines[key.change].rung == SEARCHES}
     run = bench.evaluator.outcomes
     detailed: list[Settings] = []
     outcomes = run([point.settings for point in asked.values()])
@@ -144,7 +150,7 @@ def confirmed(
         detailed.append(point.settings | {"circuit.model": rung})
     found = dict(points)
     for key, settings, outcome in zip(asked, detailed, run(detailed), strict=True):
-        value = scored(outcome)[NUMBER[key[1]]]
+        value = scored(outcome)[NUMBER[key.goal]]
         found[key] = replace(points[key], rung=settings["circuit.model"], there=value)
     return found
 
@@ -155,19 +161,19 @@ def tried(
     """The machines of ``names`` at the robust settings of the unchanged device (``own``), each
     compared with the unchanged device at the same setting on the same circuit."""
     found: dict[Key, Point] = {}
-    for (as_it_is, goal, kind), point in own.items():
-        if kind != "robust":
+    for key, point in own.items():
+        if key.kind != "robust":
             continue
         for name in names:
             changed = machines[name]
-            unchanged = replace(machines[as_it_is], rung=changed.rung)
+            unchanged = replace(machines[key.change], rung=changed.rung)
             runs = [
                 [machine.at(turn, SHORT, SPAN) for turn in around(np.array(point.point))]
                 for machine in (changed, unchanged)
             ]
             outcomes, others = bench.outcomes(runs)
             if not any(outcome.failure for outcome in (*outcomes, *others)):
-                median = _point(goal, point.point, others, runs[1][0]).median
-                judged_point = _point(goal, point.point, outcomes, runs[0][0])
-                found[name, goal, kind] = replace(judged_point, against=median)
+                median = _point(key.goal, point.point, others, runs[1][0]).median
+                judged_point = _point(key.goal, point.point, outcomes, runs[0][0])
+                found[key._replace(change=name)] = replace(judged_point, against=median)
     return found

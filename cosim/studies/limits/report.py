@@ -15,7 +15,7 @@ from cosim.scene.loading import Overrides
 from cosim.studies.limits import figures
 from cosim.studies.limits.answer import BY_NAME, ends, gains, noise, percent, sentences
 from cosim.studies.limits.changes import AS_IT_IS, CHANGES, Settings
-from cosim.studies.limits.judge import Key, Point
+from cosim.studies.limits.judge import Point
 from cosim.studies.limits.runs import GOALS, NEEDED, Goal, command
 from cosim.studies.limits.study import FULL, QUICK, Study, checked, ensemble, steps, study
 from cosim.studies.report import Progress, Report, Row, counted, silent
@@ -34,13 +34,13 @@ def report(found: Study, asked: str) -> Report:
         for goal in GOALS
     }
     tables["How the device as it is, and its best shapes, are repeated"] = [
-        {**_named(key), "command": f"`{command(asked, point.settings)}`"}
+        {**key._asdict(), "command": f"`{command(asked, point.settings)}`"}
         for key, point in found.rigs[0].points.items()
-        if groups[key[0]] in ("", "waveform") and point.settings
+        if groups[key.change] in ("", "waveform") and point.settings
     ]
     rows = [
         {
-            **({"rig": number} | _named(key) | _row(BY_NAME[key[1]], point)),
+            **({"rig": number} | key._asdict() | _row(BY_NAME[key.goal], point)),
             "command": command(asked, rig.settings | point.settings),
         }
         for number, rig in enumerate(found.rigs)
@@ -55,10 +55,6 @@ def report(found: Study, asked: str) -> Report:
         *("limits", "What is achievable, and what would change it"),
         *(rows, said, tables, drawn, "\n\n".join(said)),
     )
-
-
-def _named(key: Key) -> Row:
-    return dict(zip(("change", "goal", "kind"), key, strict=True))
 
 
 def _row(goal: Goal, point: Point) -> Row:

@@ -63,7 +63,7 @@ class Rig:
 
     def point(self, change: Change, goal: Goal, kind: str) -> Point | None:
         """The judged point of a change; None where no candidate passed."""
-        return self.points.get((change.name, goal.name, kind))
+        return self.points.get(Key(change.name, goal.name, kind))
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,7 @@ class _Work:
         rig) ngspice confirms them, and the changes that are not searched are tried."""
         found = self.store.once(f"judged {self.rig} {turn}", partial(self._judge, candidates, own))
         self.told(f"rig {self.rig}: judged")
-        return {(change, goal, kind): Point(**of) for (change, goal, kind), of in found}
+        return {Key(*names): Point(**of) for names, of in found}
 
     def _judge(
         self, candidates: dict[str, Candidates], own: bool
@@ -192,7 +192,7 @@ class _Work:
         if own:
             others = [change.name for change in self.changes if not change.searched]
             found = confirmed(self.bench, machines, found)
-            own_points = {key: one for key, one in found.items() if key[0] == AS_IT_IS.name}
+            own_points = {key: one for key, one in found.items() if key.change == AS_IT_IS.name}
             found |= tried(self.bench, machines, others, own_points)
         return [(key, vars(point)) for key, point in found.items()]
 
