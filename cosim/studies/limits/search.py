@@ -19,8 +19,11 @@ from cosim.studies.limits.runs import GOALS, Bench
 
 KINDS = ("best", "robust")
 
-Candidates = Mapping[str, Sequence[Sequence[Sequence[float]]]]
-"""For each of KINDS and of GOALS the best points, the very best first."""
+Points = Sequence[Sequence[float]]
+"""Points of a machine's cube, the best first, as lists, which a store can hold."""
+
+Candidates = Mapping[str, Sequence[Points]]
+"""What a search found: ``candidates[kind][n]`` are the points of a kind (of KINDS) for GOALS[n]."""
 
 APART, KEPT, BEST = 0.03, 4, 12
 """Least distance (in the cube) of the points that a search returns, and their number for each goal:
@@ -64,21 +67,21 @@ def searched(
     over_turns = Known(keys, len(GOALS), STEPS, bench.over_turns(machine))
     for start in [own, *warm] if own else warm:
         for kind in KINDS:
-            once.rows(_points(start[kind], keys))
-    others = [row for start in warm for row in once.rows(_points(start["robust"], keys))]
+            once.rows(_stacked(start[kind], keys))
+    others = [row for start in warm for row in once.rows(_stacked(start["robust"], keys))]
     if effort.design:
         once.search({0: Design(keys, effort.design, [*seed, 0], ends=True)}, effort.design)
     once.search({n: Climb(keys, [*seed, 1, n]) for n in _within_reach(once)}, effort.climb)
     # The robust search begins where single runs are best, where they show good surroundings, and
     # where other machines were robust.
-    starts = [_points(own["robust"], keys)] if own else []
+    starts = [_stacked(own["robust"], keys)] if own else []
     for n in range(len(GOALS)):
         starts += [once.ranked(n, APART, KEPT), once.steady(n, CLOSE, 2 * KEPT)]
         starts += [once.ranked(n, CLOSE, 2 * KEPT, others)]
     over_turns.rows(np.vstack(starts))
     climbs = {n: Climb(keys, [*seed, 2, n], step=0.03) for n in _within_reach(over_turns)}
     over_turns.search(climbs, effort.turned)
-    return {"best": _told(once, BEST), "robust": _told(over_turns, KEPT)}
+    return {"best": _by_goal(once, BEST), "robust": _by_goal(over_turns, KEPT)}
 
 
 def _within_reach(known: Known) -> list[int]:
@@ -86,13 +89,12 @@ def _within_reach(known: Known) -> list[int]:
     return np.flatnonzero(np.isfinite(known.tops())).tolist()
 
 
-def _points(every: Sequence[Sequence[Sequence[float]]], keys: int) -> Array:
+def _stacked(by_goal: Sequence[Points], keys: int) -> Array:
     """The points of all goals (rows) that have ``keys`` coordinates."""
-    found = [point for some in every for point in some if len(point) == keys]
+    found = [point for points in by_goal for point in points if len(point) == keys]
     return np.array(found).reshape(-1, keys)
 
 
-def _told(known: Known, count: int) -> list[list[list[float]]]:
-    """For each goal the ``count`` best points that are APART, as lists for the store."""
-    found: list[Array] = [known.ranked(n, APART, count) for n in range(len(GOALS))]
-    return [points.tolist() for points in found]
+def _by_goal(known: Known, count: int) -> list[Points]:
+    """For each goal the ``count`` best points that are APART."""
+    return [known.ranked(n, APART, count).tolist() for n in range(len(GOALS))]

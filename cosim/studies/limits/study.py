@@ -18,7 +18,7 @@ from cosim.simulation.summary import budget
 from cosim.studies.limits.changes import AS_IT_IS, CHANGES, Change, Settings
 from cosim.studies.limits.judge import Key, Point, confirmed, judged, tried
 from cosim.studies.limits.runs import Bench, Goal
-from cosim.studies.limits.search import KINDS, Candidates, Effort, searched
+from cosim.studies.limits.search import KINDS, Candidates, Effort, Points, searched
 
 
 @dataclass(frozen=True)
@@ -171,11 +171,14 @@ class _Work:
         """The best candidate for each goal of another change, as a start for ``change``. Where only
         the latter's command consists of levels, they are sampled from the other's waveform."""
         machine, donor = (each.machine(self.bench.scene) for each in (change, other))
-        more: list[float] = []
+        levels: list[float] = []
         if machine.levels and not donor.levels:
-            more = donor.sampled(self.bench.scene, machine.levels).tolist()
-        of = found[other.name]
-        return {kind: [[[*one, *more] for one in some[:1]] for some in of[kind]] for kind in KINDS}
+            levels = donor.sampled(self.bench.scene, machine.levels).tolist()
+
+        def best(points: Points) -> Points:
+            return [[*point, *levels] for point in points[:1]]
+
+        return {kind: [*map(best, by_goal)] for kind, by_goal in found[other.name].items()}
 
     def points(self, candidates: dict[str, Candidates], turn: int, own: bool) -> dict[Key, Point]:
         """The judged points of the ``candidates`` of a turn. With ``own`` (turn 0 on the scene's

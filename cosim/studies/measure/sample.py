@@ -228,7 +228,7 @@ def _robust(
     candidates = searched(bench, machine, effort, seed, own)
     # Only the goal v_up was scored; the lists of the other goals are emptied.
     found = {
-        kind: [best if n == UP else [] for n, best in enumerate(by_goal)]
+        kind: [points if n == UP else [] for n, points in enumerate(by_goal)]
         for kind, by_goal in candidates.items()
     }
     points = found["robust"][UP][:1]
