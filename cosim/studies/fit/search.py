@@ -11,16 +11,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import t as student
 
 from cosim.arrays import Array
-from cosim.studies.fit.slides import Slide, marginal, slides_of
+from cosim.studies.fit.slides import Rows, Slide, marginal, slides_of
 from cosim.trials.published import GRAVITY
 from cosim.trials.tracked import Trial
 
 Interval = tuple[float, float]
-Rows = npt.NDArray[np.intp]
 
 FRICTIONS: Interval = (0.3, 60.0)
 """Range of µ_k F_n that is searched, in weights of the part."""
@@ -87,65 +85,70 @@ class Fit:
     profile: list[tuple[Array, Array]]
 
 
+class _Scan:
+    """The losses of laws on a grid: ``grids`` of each trial's frictions [weights], and ``ratios``
+    for all trials. The losses are those of each slide of a trial (slides × frictions × ratios), of
+    each trial (frictions × ratios), and of all trials at each one's best friction (ratios)."""
+
+    def __init__(self, slides: list[list[Slide]], grids: list[Array], ratios: Array) -> None:
+        self.grids, self.ratios = grids, ratios
+        self.of_slides = [_losses(*each, ratios) for each in zip(slides, grids, strict=True)]
+        self.of_trials = [losses.sum(axis=0) for losses in self.of_slides]
+        self.of_all: Array = np.sum([loss.min(axis=0) for loss in self.of_trials], axis=0)
+        # The likeliest law by its indices: the ratio, and each trial's friction at this ratio.
+        self._row = int(self.of_all.argmin())
+        self._best = [int(loss[:, self._row].argmin()) for loss in self.of_trials]
+        self.ratio = self.ratios[self._row]
+        self.kinetic = [grid[k] for grid, k in zip(grids, self._best, strict=True)]
+
+    @property
+    def at_edge(self) -> bool:
+        """Whether the likeliest law lies at the end of a grid, but for the ratio 0."""
+        above, below = 0 < self._row == len(self.ratios) - 1, self._row == 0 < self.ratio
+        each = zip(self._best, self.grids, strict=True)
+        return above or below or any(k in (0, len(grid) - 1) for k, grid in each)
+
+    def profile(self, k: int) -> Array:
+        """The loss of each friction of trial ``k`` above the least: at each ratio the other trials
+        take their own best friction; then the best ratio is taken for each friction."""
+        others = self.of_all - self.of_trials[k].min(axis=0)
+        return (self.of_trials[k] + others).min(axis=1) - self.of_all.min()
+
+
 def search(trials: Sequence[Trial], limits: Sequence[Interval], plate: bool) -> Fit:
     """The likeliest law, each trial's µ_k F_n [weights] within its limits; without ``plate`` the
     spring-loaded plate has no friction."""
-    coarse = np.geomspace(*FRICTIONS, COARSE)
-    slides = [slides_of(trial, *_laws(coarse, RATIOS)) for trial in trials]
-    ratios = RATIOS if plate else np.zeros(1)
-    grids = [coarse.clip(*limit) for limit in limits]
-    # ``row`` is the likeliest ratio and ``best`` each trial's friction with it, by their numbers.
-    *_, row, best = _looked_at(slides, grids, ratios)
-    middles = [grid[k] for grid, k in zip(grids, best, strict=True)]
-    # Finer grids about the likeliest law, moved while it lies at the edge of one of them.
+    frictions = np.geomspace(*FRICTIONS, COARSE)
+    slides = [slides_of(trial, *_laws(frictions, RATIOS)) for trial in trials]
+    coarse = [frictions.clip(*limit) for limit in limits]
+    scan = _Scan(slides, coarse, RATIOS if plate else np.zeros(1))
+    # Finer grids about the likeliest law, moved and searched again while it lies at an edge.
     around = np.geomspace(1 / AROUND, AROUND, FINE)
     for _ in range(3):
-        if plate:
-            ratios = np.unique((ratios[row] + NEAR).clip(0.0))
-        grids = [(x * around).clip(*limit) for x, limit in zip(middles, limits, strict=True)]
-        *_, row, best = _looked_at(slides, grids, ratios)
-        middles = [grid[k] for grid, k in zip(grids, best, strict=True)]
-        # A grid whose best point lies at its edge is moved there and searched again.
-        inside = not plate or (row < len(ratios) - 1 and (row > 0 or ratios[0] == 0.0))
-        if inside and not {0, FINE - 1} & set(best):
+        ratios = np.unique((scan.ratio + NEAR).clip(0.0)) if plate else scan.ratios
+        grids = [(x * around).clip(*limit) for x, limit in zip(scan.kinetic, limits, strict=True)]
+        scan = _Scan(slides, grids, ratios)
+        if not scan.at_edge:
             break
     # Intervals may reach far beyond the fine grids, so the coarse ones are added for them.
-    grids = [np.unique([*coarse.clip(*x), *grid]) for x, grid in zip(limits, grids, strict=True)]
-    if plate:
-        ratios = np.unique([*RATIOS, *ratios])
-    tables, sums, whole, row, best = _looked_at(slides, grids, ratios)
-    rows, drawn = _drawn(tables)
-    count = [len(table) for table in tables]
-    found, profiles = [], []
-    for k, (grid, limit) in enumerate(zip(grids, limits, strict=True)):
-        # At each ratio the other trials take their own best friction; then the best ratio is
-        # taken for each friction of this trial. ``sums[k]`` is frictions × ratios.
-        others = whole - sums[k].min(axis=0)
-        profile = (sums[k] + others).min(axis=1) - whole.min()
-        profiles.append((grid, profile))
-        value = float(grid[best[k]])
-        if count[k] < FEWEST:  # too few to tell their scatter
-            value = value if count[k] else float(np.sqrt(limit[0] * limit[1]))
-            found.append(Found(value, *limit))
-            continue
-        likely = _likely(grid, profile)
-        found.append(_interval(value, likely, grid[drawn[:, k]], count[k], limit))
-    likely = _likely(ratios, whole - whole.min())
-    ratio = _interval(float(ratios[row]), likely, ratios[rows], sum(count), (0.0, 9.0))
+    grids = [np.unique([*x, *fine]) for x, fine in zip(coarse, scan.grids, strict=True)]
+    ratios = np.unique([*RATIOS, *scan.ratios]) if plate else scan.ratios
+    return _with_intervals(slides, _Scan(slides, grids, ratios), limits)
+
+
+def _with_intervals(slides: list[list[Slide]], scan: _Scan, limits: Sequence[Interval]) -> Fit:
+    """The likeliest law of a scan, and the intervals of its numbers."""
+    rows, drawn = _drawn(scan.of_slides)
+    found, profiles = [], [(grid, scan.profile(k)) for k, grid in enumerate(scan.grids)]
+    for k, ((grid, profile), limit) in enumerate(zip(profiles, limits, strict=True)):
+        value, count = float(scan.kinetic[k]), len(slides[k])
+        if count >= FEWEST:
+            found.append(_interval(value, _likely(grid, profile), grid[drawn[:, k]], count, limit))
+        else:  # too few to tell their scatter
+            found.append(Found(value if count else float(np.sqrt(limit[0] * limit[1])), *limit))
+    likely, count = _likely(scan.ratios, scan.of_all - scan.of_all.min()), sum(map(len, slides))
+    ratio = _interval(float(scan.ratio), likely, scan.ratios[rows], count, (0.0, 9.0))
     return Fit(ratio, found, slides, profiles)
-
-
-def _looked_at(
-    slides: Sequence[list[Slide]], grids: Sequence[Array], ratios: Array
-) -> tuple[list[Array], list[Array], Array, int, list[int]]:
-    """The losses of each trial (slides × frictions × ratios); their sums over slides (frictions ×
-    ratios); the sum over trials at each one's best friction (ratios); the index of the likeliest
-    ratio, and at this ratio the index of each trial's likeliest friction."""
-    tables = [_losses(each, grid, ratios) for each, grid in zip(slides, grids, strict=True)]
-    sums = [table.sum(axis=0) for table in tables]
-    whole: Array = np.sum([loss.min(axis=0) for loss in sums], axis=0)
-    row = int(whole.argmin())
-    return tables, sums, whole, row, [int(loss[:, row].argmin()) for loss in sums]
 
 
 def _drawn(tables: Sequence[Array]) -> tuple[Rows, Rows]:

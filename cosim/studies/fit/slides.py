@@ -73,54 +73,45 @@ class Slide:
         Gauss–Newton, since the plate's friction changes its sign with it. Arrays are pairs × laws,
         or pairs × laws × frames.
         """
-        lasts = (self.end - self.begin)[:, None]
-        since = (self.time - self.begin[:, None])[:, None]
         # The first pass leaves the plate's friction out: its sign needs a first velocity.
-        pull, rub = self.sign * kinetic - GRAVITY, 0.0 * plate
-        faster = np.zeros((len(lasts), len(kinetic)))  # velocity relative to the plate, m/s
-        level, turned = self.level[:, None], self.whiten.swapaxes(1, 2)
-        found = faster
+        friction = 0.0 * plate
+        relative = found = np.zeros((len(self.begin), len(kinetic)))
+        level, whiten = self.level[:, None], self.whiten.swapaxes(1, 2)
         for _ in range(PASSES):
-            path, slope = self._path(since, lasts, faster, pull, rub)
-            error, slope = (self.z - path) @ turned, slope @ turned
+            path, slope = self._path(self.time, relative, kinetic, friction)
+            error, slope = (self.z - path) @ whiten, slope @ whiten
             # Projecting ``level`` out of the whitened residuals (error) and of their derivative
             # (slope) eliminates the height; the velocity is then a scalar least-squares problem.
             error -= (error * level).sum(axis=-1, keepdims=True) * level
             slope -= (slope * level).sum(axis=-1, keepdims=True) * level
             size, descent = (slope**2).sum(axis=-1) + LEAST_SIZE, (slope * error).sum(axis=-1)
             found = (descent**2 / size - (error**2).sum(axis=-1)) / 2  # of the linearised optimum
-            faster, rub = faster + descent / size, plate
-        return (self.fixed[:, None] + found).T, faster
+            relative, friction = relative + descent / size, plate
+        return (self.fixed[:, None] + found).T, relative
 
     def _path(
-        self, since: Array, lasts: Array, faster: Array, pull: Array, rub: Array
+        self, time: Array, relative: Array, kinetic: Array, plate: Array
     ) -> tuple[Array, Array]:
-        """The displacement [m] at times ``since`` the begin, and its derivative by the initial
-        velocity ``faster`` [s]; both pairs × laws × frames.
-
-        Before the begin and after the end the velocity is constant: the covariance holds how the
-        part accelerates there. In between the acceleration is ``first`` until the part is as fast
-        as the plate (after ``turns``, s), and ``second`` from then on."""
-        early, within = np.minimum(since, 0.0), since.clip(0.0, lasts[..., None])
-        beyond = (since - lasts[..., None]).clip(0.0)
-        v, way = self.v_plate + faster, np.where(faster >= 0.0, 1.0, -1.0)
-        first = pull - way * rub
-        turns = np.broadcast_to(lasts, faster.shape).copy()
-        np.divide(-faster, first, out=turns, where=first * faster < 0.0)
-        turns = np.minimum(turns, lasts)
-        # At the plate's velocity the part reverses over the plate, or sticks to it (second = 0)
-        # where the plate's friction exceeds the pull.
-        second = pull + way * rub
-        second = np.where(second * way < 0.0, second, 0.0)
-        left = lasts - turns
-        v_turned = v + first * turns
-        # Derivative by ``faster`` of the velocity after the turn, which itself comes later.
-        share = np.divide(second, first, out=np.ones_like(first), where=left > 0.0)[..., None]
-        to_turn = np.minimum(within, turns[..., None])  # s, the parts of ``within``
-        from_turn = within - to_turn
-        path = (v[..., None] + first[..., None] * to_turn / 2) * to_turn + v[..., None] * early
-        path += (v_turned[..., None] + second[..., None] * from_turn / 2) * from_turn
-        path += (v_turned + second * left)[..., None] * beyond
+        """The part's displacement [m] from the begin until ``time``, and its derivative by the
+        initial velocity ``relative`` to the plate [s]; both pairs × laws × frames. Before the begin
+        and after the end the velocity is constant: the covariance holds how the part accelerates
+        there."""
+        lasts = (self.end - self.begin)[:, None, None]
+        relative, without = relative[..., None], (self.sign * kinetic - GRAVITY)[:, None]
+        first, second, turn = _accelerations(relative, lasts, without, plate[:, None])
+        v_begin = self.v_plate + relative
+        v_turn = v_begin + first * turn
+        v_end = v_turn + second * (lasts - turn)
+        # The time since the begin is split at the slide's begin, turn and end.
+        since = (time - self.begin[:, None])[:, None]
+        early, sliding = np.minimum(since, 0.0), since.clip(0.0, lasts)
+        to_turn, beyond = np.minimum(sliding, turn), (since - lasts).clip(0.0)
+        from_turn = sliding - to_turn
+        path = v_begin * early + (v_begin + first * to_turn / 2) * to_turn
+        path += (v_turn + second * from_turn / 2) * from_turn
+        path += v_end * beyond
+        # The initial velocity moves the turn, too, so velocities after it change by this share.
+        share = np.divide(second, first, out=np.ones_like(first), where=turn < lasts)
         return path, early + to_turn + share * (from_turn + beyond)
 
     def predicted(self, kinetic: float, plate: float, time: Array) -> Array:
@@ -129,9 +120,8 @@ class Slide:
         law = np.array([kinetic]), np.array([plate])
         likeliest = self.log_likelihoods(*law)[0].argmax()
         best = self.only(np.arange(len(self.begin)) == likeliest)
-        since = (np.concatenate([self.time, time]) - best.begin)[None, None]
-        faster, lasts = best._of_few(*law)[1], (best.end - best.begin)[:, None]
-        path = best._path(since, lasts, faster, self.sign * law[0] - GRAVITY, law[1])[0][0, 0]
+        whole = np.concatenate([self.time, time])
+        path = best._path(whole, best._of_few(*law)[1], *law)[0][0, 0]
         frames = len(self.time)
         # Generalised least squares of a constant: the weights are proportional to 1ᵀ C⁻¹.
         weights = best.level[0] @ best.whiten[0]
@@ -144,6 +134,20 @@ class Slide:
         names = ("begin", "end", "whiten", "fixed", "level")
         chosen = {name: getattr(self, name)[pairs] for name in names}
         return Slide(self.sign, self.time, self.z, self.v_plate, **chosen)
+
+
+def _accelerations(
+    relative: Array, lasts: Array, without: Array, plate: Array
+) -> tuple[Array, Array, Array]:
+    """The part's accelerations until it is as fast as the plate, and from then on; and the time of
+    this turn since the begin, at most ``lasts``. ``without`` is the acceleration without the plate,
+    whose friction, ``plate``, opposes the part's velocity ``relative`` to it."""
+    direction = np.where(relative >= 0.0, 1.0, -1.0)
+    first, second = without - direction * plate, without + direction * plate
+    turn = np.broadcast_to(lasts, relative.shape).copy()
+    np.divide(-relative, first, out=turn, where=first * relative < 0.0)
+    # The part then reverses over the plate, or sticks to it where the plate's friction can hold it.
+    return first, np.where(second * direction < 0.0, second, 0.0), np.minimum(turn, lasts)
 
 
 @dataclass(frozen=True)
@@ -207,15 +211,8 @@ def slide(trial: Trial, span: Span, noise: float, roughness: float) -> Slide | N
     if len(begin) == 0:
         return None
     at, z = time[span.frames], trial.part.z[span.frames]
-    # g × n × n: noise, and on each side of the slide a free acceleration a (heights a x²/2, time x
-    # from the slide) that goes on as a random walk.
-    covariance = np.repeat(noise**2 * np.eye(len(at))[None], len(begin), axis=0)
-    for away in (begin[:, None] - at, at - end[:, None]):
-        outside = np.clip(away, 0.0, None)
-        x, y = outside[:, :, None], outside[:, None, :]
-        covariance += ACCELERATION**2 * (x * y) ** 2 / 4 + roughness * _walk(x, y)
-    factor = np.linalg.cholesky(covariance)
-    whiten = np.linalg.inv(factor)
+    factor = np.linalg.cholesky(_covariances(at, begin, end, noise, roughness))
+    whiten = np.asarray(np.linalg.inv(factor), np.float64)
     level = whiten.sum(axis=2)
     length = np.linalg.norm(level, axis=1, keepdims=True)
     level /= length
@@ -223,13 +220,24 @@ def slide(trial: Trial, span: Span, noise: float, roughness: float) -> Slide | N
     # logarithm of the area spanned by their whitened directions, here ``level`` and ``along``.
     along = ((at - begin[:, None])[:, None, :] @ whiten.swapaxes(1, 2))[:, 0]
     along -= (along * level).sum(axis=1, keepdims=True) * level
-    volume = np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
-    volume += np.log(length[:, 0] * np.linalg.norm(along, axis=1))
-    v_plate = plate_velocity(trial)[span.inside].mean()
-    return Slide(
-        *(span.sign, at, z, float(v_plate), begin, end, whiten),
-        *(-volume - np.log(len(begin)), level),
-    )
+    area = length[:, 0] * np.linalg.norm(along, axis=1)
+    # ln |C|/2 is the sum of the logarithms of the Cholesky factor's diagonal.
+    volume = np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1) + np.log(area)
+    fixed = -volume - np.log(len(begin))  # all pairs of instants are equally likely before
+    v_plate = float(plate_velocity(trial)[span.inside].mean())
+    return Slide(span.sign, at, z, v_plate, begin, end, whiten, fixed, level)
+
+
+def _covariances(at: Array, begin: Array, end: Array, noise: float, roughness: float) -> Array:
+    """Covariances (g × n × n) of the heights at the times ``at``: noise, and on each side of the
+    slide a free acceleration a (heights a x²/2, time x from the slide) that goes on as a random
+    walk."""
+    found = np.repeat(noise**2 * np.eye(len(at))[None], len(begin), axis=0)
+    for away in (begin[:, None] - at, at - end[:, None]):
+        outside = np.clip(away, 0.0, None)
+        x, y = outside[:, :, None], outside[:, None, :]
+        found += ACCELERATION**2 * (x * y) ** 2 / 4 + roughness * _walk(x, y)
+    return found
 
 
 def _walk(x: Array, y: Array) -> Array:
