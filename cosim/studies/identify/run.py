@@ -106,22 +106,23 @@ def identify(
 def _identified(
     plans: list[list[Plan]], trials: list[Measured], apart: list[Measured]
 ) -> Identification:
+    """The best rig of all laws, with its errors, and the other rigs that may be meant."""
     laws = [searched(several) for several in plans]
     best = best_of([law.best for law in laws])
     # Stages on the best rig run in the first plan of its law.
     plan = plans[[law.best for law in laws].index(best)][0]
     effective = solved.samples(trials, best)
     meant = rigs_meant(laws, effective)
-    agreed = any(law.converged for law in laws)
-    apart_by = [deviations(plan.fine, rig, effective) for rig in meant] if agreed else None
-    verdicts = judge(best, meant, apart_by)
+    converged = [law.best.space.law for law in laws if law.converged]
+    errors = [deviations(plan.fine, rig, effective) for rig in meant] if converged else None
+    verdicts = judge(best, meant, errors)
     # Three-fold cross-validation needs a trial in each fold.
-    rigs, held_out = _folds(plan, trials) if len(trials) >= 3 else ([], [])
-    aside = replace(plan.fine, targets=[trial.fine for trial in apart])
-    own = plan.drives("trials apart", best.point, aside).own if apart else np.empty((0, 0))
+    fold_rigs, held_out = _folds(plan, trials) if len(trials) >= 3 else ([], [])
+    unseen = replace(plan.fine, targets=[trial.fine for trial in apart])
+    apart_own = plan.drives("trials apart", best.point, unseen).own if apart else np.empty((0, 0))
     rows, checks = solved.told_of_trials(trials, best)
     made_up = solved.errors_on(_made_up(plans[0][0]), trials)
-    told = [solved.told_of_law(trials, law) for law in laws]
+    means = {kind: solved.overall([row[kind] for row in held_out]) for kind in solved.KINDS}
     numbers = {
         "cost": best.total,
         "rig": best.settings,
@@ -130,14 +131,10 @@ def _identified(
         "trials": rows,
         "apart": [
             solved.errors(trial, best.rig, one) | solved.repeatability(trial) | own_parameters(one)
-            for trial, one in zip(apart, own, strict=True)
+            for trial, one in zip(apart, apart_own, strict=True)
         ],
         "held_out": held_out,
-        "held_out_overall": {
-            kind: solved.overall([one[kind] for one in held_out]) for kind in solved.KINDS
-        }
-        if held_out
-        else None,
+        "held_out_overall": means if held_out else None,
         "made_up_rig": {"overall": solved.overall(made_up), "trials": made_up},
         "exact_rungs_v_average_mm_per_s": checks,
         "bands": [
@@ -145,14 +142,14 @@ def _identified(
             for trial, one in zip(trials, best.own, strict=True)
             for row in solved.bands(trial, best.rig, one)
         ],
-        "converged": [law["law"] for law in told if law["converged"]],
+        "converged": converged,
         "effective_samples": effective,
-        "laws": told,
+        "laws": [solved.told_of_law(trials, law) for law in laws],
         "force": solved.told_of_force(meant),
-        "ensemble": [solved.told_of_rig(one, best) for one in meant],
-        "folds": [solved.told_of_rig(one) for one in rigs],
+        "ensemble": [solved.told_of_rig(rig, best) for rig in meant],
+        "folds": [solved.told_of_rig(rig) for rig in fold_rigs],
     }
-    return Identification(trials, best, apart, own, meant, verdicts, numbers)
+    return Identification(trials, best, apart, apart_own, meant, verdicts, numbers)
 
 
 def _steady(trial: Measured) -> bool:

@@ -152,10 +152,7 @@ def summary(found: Solved) -> str:
 
 def _mean_and_worst(overall: Row, of: str = "") -> list[Row]:
     worst = overall["nrmse_v_surface_worst"]
-    return [
-        overall | {"trial": f"{of}mean"},
-        {"trial": f"{of}worst", "nrmse_v_surface": worst},
-    ]
+    return [overall | {"trial": f"{of}mean"}, {"trial": f"{of}worst", "nrmse_v_surface": worst}]
 
 
 def _between(row: Row, unit: str) -> str:

@@ -101,6 +101,14 @@ def _best(own: Array, cost: Array, kept: int) -> tuple[Array, Array]:
     return best, np.take_along_axis(cost, order, 1)
 
 
+def _inherited(points: Array, parents: Array, parents_own: Array, follow: Array) -> Array:
+    """Own parameters (n × trials × OWN) with which rigs at points (n × free) start: those of the
+    nearest parent, corrected by ``follow`` (trials × OWN × free) for the difference of the two."""
+    apart = (points[:, None] - parents) / (parents.std(axis=0) + 1e-6)  # rigs × parents × free
+    near = (apart**2).sum(axis=2).argmin(axis=1)
+    return parents_own[near] + np.einsum("tkd,nd->ntk", follow, points - parents[near])
+
+
 def _perturbed(point: Array, step: float) -> tuple[Array, Array]:
     """A point (d) and d neighbours, each moved in one coordinate (rows, 1 + d), and the steps (d):
     backwards where a forward step would leave the unit cube."""
@@ -171,6 +179,14 @@ class Search:
         wide = np.repeat(rigs, m, axis=0)
         found, cost = refine(each, wide, own.reshape(n * m, -1), rounds, self.workers)
         return found.reshape(own.shape), cost.reshape(n, m)
+
+    def _refined_once(self, points: Array, own: Array) -> tuple[Array, Array]:
+        """Own parameters of rigs (n × trials × OWN), within bounds, fitted in one round; costs."""
+        rigs = np.repeat(self.space.rigs(points), len(self.targets), axis=0)
+        own = np.clip(own, self.bounds("low"), self.bounds("high"))
+        pairs = own.reshape(-1, 1, len(OWN))  # a row for each pair of rig and trial
+        found, costs = self._refined_each([*self.targets] * len(points), rigs, pairs, 1)
+        return found.reshape(own.shape), costs.reshape(own.shape[:2])
 
     def rescreened(
         self, found: Found, rng: np.random.Generator, count: int, kept: int, rounds: int
@@ -252,7 +268,6 @@ class Search:
     ) -> Found:
         """The best solution of CMA-ES over the rig from ``start`` on. The first step is ``sigma``,
         as a share of the bounds' ranges."""
-        space, trials = self.space, len(self.targets)
         search = CMA(
             mean=np.clip(start.point, 1e-3, 1 - 1e-3),
             sigma=sigma,
@@ -260,28 +275,14 @@ class Search:
             population_size=POPULATION,
             seed=int(rng.integers(2**31)),
         )
-        low, high = self.bounds("low"), self.bounds("high")
         best = leader = self.refined(start.point, start.own, 2)  # of all, of this generation
-        follow = self.sensitivity(leader.point, leader.own)
+        follow = self.sensitivity(leader.point, leader.own)  # how own parameters follow the rig
         parents, parents_own = leader.point[None], leader.own[None]
         for generation in range(1, generations + 1):
             asked = [search.ask() for _ in range(POPULATION)]
             points = np.array(asked)
-            # Each rig starts with the own parameters of its nearest parent (distances in units of
-            # the parents' spread), plus sensitivity (trials t × OWN k × free d) times the rigs'
-            # difference (rigs n × d): rigs × trials × OWN.
-            spread = parents.std(axis=0) + 1e-6
-            distance = ((points[:, None] - parents) / spread) ** 2  # rigs × parents × free
-            near = distance.sum(axis=2).argmin(axis=1)
-            moved = parents_own[near] + np.einsum("tkd,nd->ntk", follow, points - parents[near])
-            # One round of least squares for each pair of rig and trial, flattened to rows.
-            own, costs = refine(
-                [*self.targets] * POPULATION,
-                np.repeat(space.rigs(points), trials, axis=0),
-                np.clip(moved, low, high).reshape(-1, len(OWN)),
-                *(1, self.workers),
-            )
-            own, costs = own.reshape(POPULATION, trials, -1), costs.reshape(POPULATION, trials)
+            begun = _inherited(points, parents, parents_own, follow)
+            own, costs = self._refined_once(points, begun)
             totals = self.totals(costs, points)
             search.tell([*zip(asked, totals.tolist(), strict=True)])
             k = int(totals.argmin())
