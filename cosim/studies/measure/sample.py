@@ -226,14 +226,9 @@ def _robust(
     """The candidates of a change for the robust velocity upwards, and that velocity, m/s."""
     machine = BY_NAME[name].machine(bench.scene)
     candidates = searched(bench, machine, effort, seed, own)
-    # Only the goal v_up was scored; the lists of the other goals are emptied.
-    found = {
-        kind: [points if n == UP else [] for n, points in enumerate(by_goal)]
-        for kind, by_goal in candidates.items()
-    }
-    points = found["robust"][UP][:1]
+    points = candidates["robust"][UP][:1]
     speed = float(bench.over_turns(machine)(np.array(points))[0][0, UP]) if points else nan
-    return found, speed
+    return candidates, speed
 
 
 def _films(
