@@ -163,13 +163,12 @@ def _as_it_is(study: Study, goal: Goal) -> Iterator[str]:
     if robust is None or best is None:
         return
     known = [one.median * goal.scale for one in every if one]
-    unit = goal.unit
     value, median, worst, single = (
-        f"{brief(x * goal.scale)} {unit}"
+        f"{brief(x * goal.scale)} {goal.unit}"
         for x in (robust.median, best.median, robust.worst, best.value)
     )
     if len(known) > 1:
-        middle = f"{brief(float(np.median(known)))} {unit}"
+        middle = f"{brief(float(np.median(known)))} {goal.unit}"
         reached = f"a robust {middle} of {goal.title} (median of {len(known)} rigs, {span(known)})"
         reached += f". On the scene's rig it is {value}"
     else:

@@ -9,15 +9,7 @@ from cosim.studies.limits.answer import gains, in_short, noise
 from cosim.studies.limits.changes import AS_IT_IS
 from cosim.studies.limits.runs import Goal
 from cosim.studies.limits.study import Study
-from cosim.studies.plots import (
-    BLUE,
-    GREEN,
-    ORANGE,
-    PURPLE,
-    VERMILION,
-    keep_ticks_inside,
-    panels,
-)
+from cosim.studies.plots import BLUE, GREEN, ORANGE, PURPLE, VERMILION, keep_ticks_inside, panels
 
 COLORS = {
     **{"": "0.15", "waveform": VERMILION, "heat": ORANGE, "grip": GREEN},

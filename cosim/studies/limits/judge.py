@@ -7,6 +7,7 @@ not settled. The best settled candidate that is feasible represents its machine.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from math import nan
 from typing import NamedTuple
 
@@ -161,19 +162,16 @@ def tried(
     """The machines of ``names`` at the robust settings of the unchanged device (``own``), each
     compared with the unchanged device at the same setting on the same circuit."""
     found: dict[Key, Point] = {}
-    for key, point in own.items():
-        if key.kind != "robust":
-            continue
-        for name in names:
-            changed = machines[name]
-            unchanged = replace(machines[key.change], rung=changed.rung)
-            runs = [
-                [machine.at(turn, SHORT, SPAN) for turn in around(np.array(point.point))]
-                for machine in (changed, unchanged)
-            ]
-            outcomes, others = bench.outcomes(runs)
-            if not any(outcome.failure for outcome in (*outcomes, *others)):
-                median = _point(key.goal, point.point, others, runs[1][0]).median
-                judged_point = _point(key.goal, point.point, outcomes, runs[0][0])
-                found[key._replace(change=name)] = replace(judged_point, against=median)
+    for key, name in product((key for key in own if key.kind == "robust"), names):
+        point, changed = own[key], machines[name]
+        unchanged = replace(machines[key.change], rung=changed.rung)
+        runs = [
+            [machine.at(turn, SHORT, SPAN) for turn in around(np.array(point.point))]
+            for machine in (changed, unchanged)
+        ]
+        outcomes, others = bench.outcomes(runs)
+        if not any(outcome.failure for outcome in (*outcomes, *others)):
+            median = _point(key.goal, point.point, others, runs[1][0]).median
+            judged_point = _point(key.goal, point.point, outcomes, runs[0][0])
+            found[key._replace(change=name)] = replace(judged_point, against=median)
     return found

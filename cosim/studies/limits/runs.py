@@ -106,9 +106,8 @@ class Bench:
         settings_at = self._scout(machine)
 
         def evaluate(points: Array) -> tuple[Array, Feasible]:
-            groups = self.outcomes(
-                [[settings_at(one) for one in neighbours(point)] for point in points]
-            )
+            runs = [[settings_at(one) for one in neighbours(point)] for point in points]
+            groups = self.outcomes(runs)
             allowed = np.array([self.feasible(machine, group[0]) for group in groups], bool)
             # points × neighbours × goals, reduced to points × goals.
             scores = np.median([[*map(scored, group)] for group in groups], axis=1)

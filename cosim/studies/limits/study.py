@@ -204,7 +204,6 @@ ALIKE = 1.25
 """Ratio of values up to which a rig counts as the scene's own, if all its keys keep to it: a search
 ends with a finite step, and files round."""
 
-
 MOST_BYTES = 1 << 24
 """Largest size of a file of rigs."""
 
