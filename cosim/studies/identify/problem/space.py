@@ -157,8 +157,7 @@ class Space:
         determines this scale: otherwise equal searches end at different ones."""
         # The ram's mass is given, so it stays. A ram that the coil alone accelerates then moves the
         # surface alike if its travel grows with the forces; one without inertia, if it stays. The
-        # root is between the two: of the powers 0, 1/4, 1/2, 3/4 and 1, with scales of 0.85 and
-        # 1.15, 1/4 or 1/2 costs least on two rigs of the published trials (laws cubic and knee).
+        # root is between the two.
         values = self.values(points)
         for k, name in enumerate(self.names):
             if name == "mechanics.travel":
