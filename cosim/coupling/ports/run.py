@@ -1,7 +1,7 @@
 """One run of a circuit that ngspice leads, joined to FMUs; the steps are those of ``ports.c``."""
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from ctypes import c_char_p, c_double, c_int64
 from functools import partial
 from typing import Any
@@ -66,13 +66,11 @@ class Run:
         self.deck = plan.deck()
         self._failure: BaseException | None = None
         count, width = len(self.deck.vectors), plan.width
-        self.places = (c_int64 * (count + 1))()
-        self._rows = [(c_double * max(width, 1))() for _ in range(3)]
-        self._saved = [(c_double * max(count, 1))() for _ in range(4)]
-        self._sources = (Source * max(len(plan.sources), 1))(*plan.sources)
-        self._asked = (c_char_p * max(count, 1))(
-            *(each.encode() or None for each in self.deck.devices)
-        )
+        self.places = _array(c_int64, length=count + 1)
+        self._rows = [_array(c_double, length=width) for _ in range(3)]
+        self._saved = [_array(c_double, length=count) for _ in range(4)]
+        self._sources = _array(Source, plan.sources)
+        self._asked = _array(c_char_p, [each.encode() or None for each in self.deck.devices])
         self.log = Tape(1 + len(plan.sources) + count)
         """Time (s), each source and each saved value at the accepted points."""
         self.points = Tape(1 + width)
@@ -85,18 +83,17 @@ class Run:
         for side in plan.sides:
             states.append(side.state(row, repeats))
             row += 8 * side.width
-        self.fmus = (StrangerState * max(len(states), 1))(*states)
+        self.fmus = _array(StrangerState, states)
         for through, feed in plan.throughs:
             through.input = feed.input
-        count_through = len(plan.throughs)
-        self._throughs = (Through * max(count_through, 1))(*(t for t, _ in plan.throughs))
-        self.odd = (c_double * max(2 * width, 1))()
+        self._throughs = _array(Through, [through for through, _ in plan.throughs])
+        self.odd = _array(c_double, length=2 * width)
         """For each output: not 0 if a repeated step gave another value; then working space."""
-        self._backs = (Back * max(width, 1))()
+        self._backs = _array(Back, length=width)
         for place in plan.backs:
             self._backs[place].is_one = 1
         slopes = [Slope(place=of.place, slope=of.slope_place) for *_, of in plan.told]
-        self._slopes = (Slope * max(len(slopes), 1))(*slopes)
+        self._slopes = _array(Slope, slopes)
         macro = scene.coupling.macro_step if plan.method == "macro-steps" else 0.0
         self.state = PortsState(
             fmus=ctypes.addressof(self.fmus),
@@ -116,7 +113,7 @@ class Run:
             end=-np.inf,
             repeats=int(repeats),
             throughs=ctypes.addressof(self._throughs),
-            n_throughs=count_through,
+            n_throughs=len(plan.throughs),
             slopes=ctypes.addressof(self._slopes),
             n_slopes=len(slopes),
             odd=ctypes.addressof(self.odd),
@@ -213,7 +210,7 @@ class Run:
             for values in found
             if len(values) > 2
         ]
-        self._pulses = (Pulse * max(len(pulses), 1))(*pulses)
+        self._pulses = _array(Pulse, pulses)
         state.pulses, state.n_pulses = ctypes.addressof(self._pulses), len(pulses)
 
     def finish(self) -> None:
@@ -243,6 +240,11 @@ class Run:
                 f"{duration:g} s. A node may ring undamped; where coupling.method is "
                 '"redo", an FMU\'s outputs may jump without end.'
             )
+
+
+def _array(kind: Any, values: Sequence[Any] = (), length: int = 0) -> Any:
+    """A C array of values, or of zeros; it has one element at least, as C knows no empty array."""
+    return (kind * max(len(values), length, 1))(*values)
 
 
 def _pulse(values: list[float], duration: float, edge: float) -> Any:
