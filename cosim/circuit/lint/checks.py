@@ -9,7 +9,7 @@ from itertools import pairwise, takewhile
 
 from cosim.circuit.lint.elements import MODEL_TYPES, Element, Scope, parse
 from cosim.circuit.lint.expressions import Names, body, check_circles, check_names, sensed, unbraced
-from cosim.circuit.lint.lines import COPY, Line, refuse, shown
+from cosim.circuit.lint.lines import Line, refuse, shown
 from cosim.circuit.lint.topology import check_topology
 from cosim.circuit.lint.words import closing, number, word_set
 
@@ -125,7 +125,7 @@ def _check_model(element: Element, scope: Scope) -> None:
         return
     types = scope.model_types(name)
     if types is None:
-        element.refuse(f": no model {shown(name)} is defined here{COPY}")
+        scope.refuse_model(element, name)
     _check_type(element, name, types)
     line = next(s.model_lines[name] for s in scope.chain() if name in s.model_lines)
     for kinds, parameter, cure in _FOREIGN:

@@ -15,7 +15,7 @@ from pathlib import Path
 from unicodedata import category
 
 from cosim.circuit.lint.dialect import in_ngspice, in_ngspice_together, prelude, since_the_start
-from cosim.circuit.lint.lines import MAX_LINE, UNKNOWN, Line, refuse, shown
+from cosim.circuit.lint.lines import MAX_LINE, UNKNOWN, Line, reason_of, refuse, shown
 from cosim.circuit.lint.words import definitions, number, word_set
 from cosim.errors import BadInput, plain
 from cosim.files import reader
@@ -224,7 +224,7 @@ class _Reader:
                 for after in lines:
                     refuse(after, "there is text after .end, which must come last")
                 return True
-            elif (text := passed(self._with_points(line, opened[-1]))) is not None:
+            elif (text := self._passed(line, opened[-1])) is not None:
                 self.depth += (word == ".subckt") - (word == ".ends")
                 if text.startswith(UNKNOWN) and self.depth < 1:
                     refuse(line, text.removeprefix(UNKNOWN))
@@ -232,6 +232,15 @@ class _Reader:
             else:
                 self._add(self.dropped, line)
         return found
+
+    def _passed(self, line: Line, base: Path) -> str | None:
+        """``passed``, but of a subcircuit, which nobody may need, only the use is to be refused."""
+        try:
+            return passed(self._with_points(line, base))
+        except BadInput as error:
+            if self.depth < 1 or _directive(line)[0] in (".subckt", ".ends"):
+                raise
+            return f"{UNKNOWN}{reason_of(error, line)}"
 
     def _add(self, lines: list[Line], line: Line) -> None:
         if len(lines) >= MAX_LINES:
@@ -416,6 +425,8 @@ def passed(line: Line) -> str | None:
         return _options(line, word, rest)
     if word == ".model":
         return _model(line)
+    if word == ".param" and not rest:
+        return None
     if not word and line.text[0].lower() not in ELEMENTS:
         name = line.text.split()[0]
         known = f" but {_GATES}" if name[0] in "aA" else ""

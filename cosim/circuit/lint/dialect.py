@@ -17,8 +17,17 @@ from math import pi
 from typing import Any
 
 from cosim.circuit.lint.laplace import without_laplace
-from cosim.circuit.lint.lines import COPY, MAX_LINE, Line, refuse, shown
+from cosim.circuit.lint.lines import (
+    COPY,
+    MAX_LINE,
+    NO_MODEL,
+    Line,
+    reason_of,
+    refuse,
+    shown,
+)
 from cosim.circuit.lint.words import closing, number, split_arguments, word_set, words
+from cosim.errors import BadInput
 
 _Key = tuple[Any, ...]  # a scope, and a name in it, perhaps with the kind of element before it
 
@@ -250,11 +259,18 @@ def in_ngspice_together(lines: Sequence[Line]) -> list[Line]:
     for place, (line, scope) in enumerate(zip(lines, scopes, strict=True)):
         text = line.text.lower()
         if match := _SWITCHING.match(text):
-            law, told = _law(line, match[2])
-            if known.setdefault((scope, _DEVICES[match[2]], match[1]), law) != law:
-                refuse(line, f"there is a second model {shown(match[1])}, so this cannot be read")
-            if law:
-                lines[place] = replace(line, text=told and f".told {told}")
+            try:
+                law, told = _law(line, match[2])
+                key = scope, _DEVICES[match[2]], match[1]
+                if known.setdefault(key, law) != law:
+                    known[key] = ""
+                    refuse(
+                        line, f"there is a second model {shown(match[1])}, so this cannot be read"
+                    )
+                if law:
+                    lines[place] = replace(line, text=told and f".told {told}")
+            except BadInput as error:
+                lines[place] = _unusable(line, error)
         elif text.startswith(".ic"):
             for name, current in _CURRENT.findall(text):
                 if name not in names[scope]:
@@ -320,8 +336,16 @@ def _complete(lines: list[Line], scopes: Sequence[tuple[int, ...]]) -> None:
         text = " ".join([".model", name, kind, *inherited, *rest])
         lines[place] = replace(lines[place], text=text)
 
-    for place in range(len(lines)):
-        complete(place)
+    for place, line in enumerate(lines):
+        try:
+            complete(place)
+        except BadInput as error:
+            lines[place] = _unusable(line, error)
+
+
+def _unusable(line: Line, error: BadInput) -> Line:
+    """In place of a model's line, what is to be said where the model is used."""
+    return replace(line, text=f"{NO_MODEL}{words(line.text)[1]} {reason_of(error, line)}")
 
 
 def _scopes(lines: Sequence[Line]) -> Iterator[tuple[int, ...]]:
@@ -352,6 +376,7 @@ def _law(line: Line, kind: str) -> tuple[str, str]:
         if odd or (number(second) or 0.0) >= 0.0:
             return "", ""
         told = "between off and on this switch is PSpice's, as LTspice's curve is not published"
+        same = False
         first, second = f"({first})-({second})", f"({first})+({second})"
     if same or 0.0 in map(number, (ron, roff, *rrev)):
         refuse(line, f"ron and roff must be above 0, {' and '.join([*_CARDS[kind]][:2])} apart")

@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 from itertools import accumulate
 from typing import NoReturn
 
-from cosim.circuit.lint.lines import COPY, UNKNOWN, Line, refuse, shown
+from cosim.circuit.lint.lines import COPY, NO_MODEL, UNKNOWN, Line, reason_of, refuse, shown
 from cosim.circuit.lint.words import definitions, split_assignments, words
+from cosim.errors import BadInput
 
 GROUND = "0"
 
@@ -36,6 +37,8 @@ _SPECIAL = {"poly", "table", "laplace", "freq", "value", "vol", "cur", "and", "n
             "vcvs", "vccs"}  # fmt: skip
 """First words of controlled sources that have no controlling nodes."""
 
+_MODEL = re.compile(r"\.model\s+([^\s=(){}']+)", re.IGNORECASE)
+_NESTING = re.compile(r"\.(?:subckt|ends|if|else|elseif|endif)\b", re.IGNORECASE)
 _FLAG = re.compile("=|^(?:off|thermal)$")
 """What a word behind the model has. ngspice 39 crashes on a bare number there, or drops it."""
 
@@ -75,6 +78,10 @@ class Scope:
     functions: set[str] = field(default_factory=set)
     models: dict[str, set[str]] = field(default_factory=dict)
     model_lines: dict[str, Line] = field(default_factory=dict)
+    bad_models: dict[str, tuple[Line, str]] = field(default_factory=dict)
+    """Models that cannot be used, by name, and the reasons."""
+    broken: BadInput | None = None
+    """What is wrong with a line of it; libraries hold subcircuits that nobody needs."""
     names: set[str] = field(default_factory=set)
     elements: list[Element] = field(default_factory=list)
     subcircuits: dict[str, list["Scope"]] = field(default_factory=dict)
@@ -95,6 +102,13 @@ class Scope:
     def model_types(self, name: str) -> set[str] | None:
         """The types of the model that ``name`` means here, None if there is none."""
         return next((s.models[name] for s in self.chain() if name in s.models), None)
+
+    def refuse_model(self, element: Element, name: str) -> NoReturn:
+        """Raise the sentence on a model that ``model_types`` has not found."""
+        for scope in self.chain():
+            if name in scope.bad_models:
+                refuse(*scope.bad_models[name])
+        element.refuse(f": no model {shown(name)} is defined here{COPY}")
 
     def subcircuit(self, name: str) -> "list[Scope] | None":
         return next((s.subcircuits[name] for s in self.chain() if name in s.subcircuits), None)
@@ -123,8 +137,20 @@ class _Parser:
         self.ifs: list[Line] = []
         self.outer_ifs: list[int] = []
         for line in lines[1:]:
-            _check_brackets(line)
-            self._take(line)
+            if line.text.startswith(NO_MODEL):
+                name, _, reason = line.text.removeprefix(NO_MODEL).partition(" ")
+                self.scope.bad_models[name.lower()] = line, reason
+                continue
+            try:
+                _check_brackets(line)
+                self._take(line)
+            except BadInput as error:
+                if model := _MODEL.match(line.text):
+                    self.scope.bad_models[model[1].lower()] = line, reason_of(error, line)
+                elif self.scope is self.top or _NESTING.match(line.text):
+                    raise
+                else:
+                    self.scope.broken = self.scope.broken or error
         if self.scope is not self.top:
             refuse(self.scope.line, f".subckt {shown(self.scope.name)} has no .ends")
         if self.ifs:
@@ -168,8 +194,6 @@ class _Parser:
     def _ends(self, line: Line, found: list[str]) -> None:
         if self.scope.parent is None:
             refuse(line, ".ends has no .subckt")
-        if len(found) > 1 and found[1] != self.scope.name:
-            refuse(line, f".ends {shown(found[1])} ends .subckt {shown(self.scope.name)}")
         if len(self.ifs) != self.outer_ifs.pop():
             refuse(line, ".if and .endif must stand in the same subcircuit")
         self.scope = self.scope.parent
@@ -213,6 +237,8 @@ class _Parser:
             if scope.used:
                 continue
             scope.used = True
+            if scope.broken:
+                raise scope.broken
             for line, _ in scope.lines:
                 if line.text.startswith(UNKNOWN):
                     refuse(line, line.text.removeprefix(UNKNOWN))
@@ -264,7 +290,7 @@ def _place(element: Element, scope: Scope) -> None:
         if place is None:
             # Which word was to be the model is a guess, for the message alone.
             name = element.words[least + 1 if kind == "m" and len(element.words) > 4 else least]
-            element.refuse(f": no model {shown(name)} is defined here{COPY}")
+            scope.refuse_model(element, name)
         _split(element, place)
         element.model = element.words.pop(0)
         if kind == "m" and place < 4 and scope.model_types(element.model) != {"vdmos"}:

@@ -8,6 +8,8 @@ from cosim.errors import BadInput, printable
 MAX_LINE = 200_000
 UNKNOWN = ".unknown "
 """Begins the replacement of a line that ngspice must not see; the reason follows."""
+NO_MODEL = ".nomodel "
+"""Begins that of a model; its name and the reason follow."""
 COPY = "; copy its .model line into the netlist"
 
 
@@ -28,6 +30,11 @@ class Line:
 def refuse(line: Line, reason: str) -> NoReturn:
     """Raise the one sentence that tells what is wrong with ``line``."""
     raise BadInput(f"{line.place}: {reason}.")
+
+
+def reason_of(error: BadInput, line: Line) -> str:
+    """The reason with which ``refuse`` raised an error for the line."""
+    return str(error).removeprefix(f"{line.place}: ").removesuffix(".")
 
 
 def shown(text: str) -> str:
