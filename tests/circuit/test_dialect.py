@@ -184,7 +184,7 @@ TOLD = {
     "C9 x 0 1u Rser=1 m=2": "write a resistor in series",
     "M9 x b 0 W\n.model W NMOS": "has too few nodes: drain, gate, source and bulk",
     "M9 x b 0 0 W 2u 10u\n.model W NMOS": "2u behind the model has no name; write name=value",
-    "I9 0 x TBL=(0,0,1,1m)": "tbl is nothing that ngspice knows of it; leave it out",
+    "I9 0 x R=1k": "r is nothing that ngspice knows of it; leave it out if the circuit is the same",
     "V9 x 0 2*3": "write {…} around its value, 2*3",
     "V9 x 0 {3}V": "something stands behind the bracket of {3}v; leave it out",
     "V9 x 0 SIN(2 1 0)": "SIN has no frequency; give one above 0, or its DC value alone",

@@ -111,6 +111,8 @@ STATIC: dict[str, dict[str, Callable[[Array, Array], Array]]] = {
         "v(c)": lambda x, t: np.where(x > 0, x**2, -0.5 * x),
         "v(d)": lambda x, t: np.interp(x, [-0.5, 0, 0.5], [-1, 0, 2]),
         "v(e)": lambda x, t: np.hypot(x, np.sin(2e3 * np.pi * t)),
+        "1k*i(V8)": lambda x, t: np.interp(-2 * x, [-1, 0, 1], [-2, 0, 1]),
+        "1k*i(V9)": lambda x, t: np.where(x > 0, x, x / 3),
         "v(g)": lambda x, t: np.arctan2(x, np.cos(2e3 * np.pi * t)),
         "v(f)": lambda x, t: np.where(x > 0.5, 2.0, np.where(x < 0.125, 1.0, 0.0)),
     },

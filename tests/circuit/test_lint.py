@@ -145,7 +145,6 @@ FUNCTIONS = [
     (IN_B + "sqr(V(v1))", f":15: the function sqr {BEFORE}"),
     (IN_B + "{sqr(3)}*V(v1)", f":15: the function sqr {BEFORE}"),
     (IN_B + "bessel(V(v1),1)", ":15: the function bessel is not defined."),
-    (IN_B + "2*abs (V(v1))", ":15: write abs( without a blank"),
     (IN_B + "agauss(V(v1),0,3)", ":15: in a B source agauss() takes plain numbers only"),
     (IN_B + "agauss(2*k,0,3)", ":15: in a B source agauss() takes plain numbers only"),
     (IN_B + "(V(v1)>0 and V(v1)<1) ? 1 : 0", ":15: the parameter and is not defined."),

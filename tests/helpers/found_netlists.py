@@ -153,7 +153,11 @@ B4 d 0 V=table(V(in),-0.5,-1,0,0,0.5,2)
 B6 f 0 V=2*buf(V(in))+inv(4*V(in))
 B5 0 e I=1m*hypot(V(in),sin(w*time))
 R5 e 0 1k
-B7 g 0 V=atan2(V(in),cos(w*time))
+B7 g 0 V=atan2 (V(in),cos(w*time))
+I8 0 h TBL(-1 -2m, 0 0 1 1m)
+V8 h 0 SINE(0 2 1k)
+B8 in k R=if (V(in)>0,1k,3k)
+V9 k 0 0
 .tran 3m
 .end
 """,

@@ -80,8 +80,10 @@ _FILE_WORD = re.compile(r"\b(?:\w*_)?(?:file|filename|wavefile)\b", re.IGNORECAS
 _COMMAND_COMMENT = re.compile(r"\*\s*(?:#\s*[\w!/.]|ng_script)", re.IGNORECASE)
 _TRAILING = re.compile(r";|//|(?:^|(?<=[\s,]))\$")  # begins a comment; "$" only between words
 _NUMBERED = re.compile(r"(?<![\w.])\$(?=n_\d)", re.IGNORECASE)  # begins PSpice's own nodes
-# A name, perhaps with "=" and a value in braces, quotes or bare.
-_OPTION = re.compile(r"([a-z_]\w*)(?:\s*=\s*(\{[^{}]*\}|'[^']*'|[\w.+-]+))?[\s,]*", re.IGNORECASE)
+# A name, perhaps with "=" and a value in braces, quotes or bare, or with a number.
+_OPTION = re.compile(
+    r"([a-z_]\w*)(?:\s*=\s*(\{[^{}]*\}|'[^']*'|[\w.+-]+)|\s+([\d.][\w.+-]*))?[\s,]*", re.IGNORECASE
+)
 # The model's type, or "ako:BASE" with a type that may follow it.
 _MODEL = re.compile(
     r"\.model\s+[^\s=(){}']+\s+(ako:[^\s(){}'=]+(?:\s+[a-z]\w*(?![\w:=]))?|[a-z]\w*)(?![\w:])",
@@ -315,22 +317,24 @@ class _Reader:
 
 
 def _text(data: bytes) -> str:
-    """Decoded from UTF-8, or Windows' UTF-16 or code page 1252, with or without byte order mark."""
+    """Decoded from UTF-8, or Windows' UTF-16 or code page 1252, with or without byte order mark;
+    each line ends with a line feed."""
     coding = "utf-8-sig"
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         coding = "utf-16"
     elif data[1:2] == b"\0" or data[:1] == b"\0":
         coding = "utf-16-le" if data[1:2] == b"\0" else "utf-16-be"
     try:
-        return data.decode(coding).replace("\r\n", "\n")
+        text = data.decode(coding)
     except UnicodeDecodeError:
-        return data.decode("cp1252", "replace").replace("\r\n", "\n")
+        text = data.decode("cp1252", "replace")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def _decoded(data: bytes, name: str) -> str:
-    """The text, its lines ended by line feeds. Any other character that some program takes for a
+    """The text. Any other character than a line feed that some program takes for a
     line's end, or does not show, is refused."""
-    text = _text(data).rstrip("\x1a").replace("\f", " ")  # printers' and DOS's ends
+    text = _text(data).replace("\x1a", " ").replace("\f", " ")  # DOS's and printers' ends
     for place, char in enumerate(text):
         if char not in "\n\t" and category(char) in ("Cc", "Cf", "Cs", "Zl", "Zp"):
             line = Line("", shown(name), text.count("\n", 0, place) + 1)
@@ -444,7 +448,7 @@ def _options(line: Line, word: str, rest: str) -> str | None:
             refuse(line, f"{shown(rest[place:])} is no option")
         name = match[1].lower()
         if name in NUMERIC_OPTIONS:
-            kept.append(match[0].strip(" ,"))
+            kept.append("=".join(filter(None, match.groups())))
         elif name not in DROPPED_OPTIONS and not name.startswith("dig"):
             refuse(line, f"the option {shown(name)} is not allowed in a netlist; leave it out")
         place = match.end()

@@ -71,8 +71,15 @@ keeps the slope of roots finite at 0. The logarithm of a switch's resistance is 
 control (Cadence, *PSpice Reference Guide*, voltage-controlled switch)."""
 _CALL = re.compile(r"(?<![\w.])([a-z_]\w*)\s*\(")
 _DEFINED = re.compile(r"\.func\s+(\w+)|(\w+)\s*(?:\([^()]*\)\s*)?=(?!=)")
-_TABLE = re.compile(r"(?<![\w.])table\s*\(", re.IGNORECASE)
+_TABLE = re.compile(r"(?<![\w.])(?:table|tbl)\s*\(", re.IGNORECASE)
+_DRAWN = re.compile(r"^(i\S*)\s+(\S+)\s+(\S+)\s+(?:tbl|table)\s*=?\s*\(([^()]*)\)", re.I)
+"""A source whose current is a table of its own voltage."""
+_BY_LAW = re.compile(r"^(b\S*)\s+(\S+)\s+(\S+)\s+r\s*=(?!=)\s*(.*)", re.IGNORECASE)
+"""LTspice's resistor of this law."""
 _PI = re.compile(r"(?<![\w.])pi(?!\w|\s*\()")
+_CONSTANTS = {"pi": pi, "boltz": 1.380649e-23, "echarge": 1.602176634e-19, "kelvin": -273.15}
+"""LTspice's, in J/K, C and degrees Celsius; of ``pi`` B sources know themselves."""
+_NATURE = re.compile(r"(?<![\w.])(boltz|echarge|kelvin)(?!\w|\s*\()")
 
 _MAKERS = word_set("mfg pn type pppkg iave vpk vceo icrating qg")
 _REMARKS = {
@@ -170,10 +177,16 @@ def _pointed(expression: str) -> str:
 def in_ngspice(line: Line) -> list[Line]:
     """The line in ngspice's dialect, as one or more lines."""
     text = _KIND.sub(r"\1", _NOISELESS.sub("", line.text.translate(_LETTERS)))
-    text = _without_tables(text)
+    if drawn := _DRAWN.match(text):
+        name, plus, minus, points = drawn.groups()
+        points = ",".join(_WORD.findall(points))
+        text = f"b{name} {plus} {minus} i=table(v({plus},{minus}),{points}){text[drawn.end() :]}"
+    text = _without_tables(_BY_LAW.sub(r"\1 \2 \3 i=v(\2,\3)/(\4)", text))
     kind, word = text[:1].lower(), text[:4].lower()
     if kind in "beg":
         text = _VALUED.sub("value=", re.sub(r"'([^']*)'", r"{\1}", text))
+        head, equals, rest = text.partition("=")  # a name before a blank is no function to ngspice
+        text = head + equals + re.sub(r"(?<![\w.])([a-z_]\w*)\s+\(", r"\1(", rest, flags=re.I)
         text = _TRUTH.sub(lambda truth: f"({truth[1] or truth[2]}>0.5)", text)
         if len(parts := [*without_laplace(text)]) > 1:
             return [each for part in parts for each in in_ngspice(replace(line, text=part))]
@@ -189,6 +202,8 @@ def in_ngspice(line: Line) -> list[Line]:
         # Only where some braced expression is not already one pair of parentheses.
         if any(each[0] != "(" or closing(each, 0) < len(each) for each in _COMPOUND.findall(text)):
             text = text.replace("{", "{(").replace("}", ")}")
+    if kind == "q":  # the substrate in brackets
+        text = re.sub(r"\[([^\s\[\]]+)\]", r"\1", text)
     if kind in "rclvibefgh":
         *parts, own = _with_parts(text, kind)
         own = _source(own) if kind in "efgh" else own
@@ -226,6 +241,7 @@ def prelude(lines: Sequence[Line]) -> list[Line]:
             defined.update(*_DEFINED.findall(text))
         if ("{" in text or "'" in text or text.startswith(".param")) and _PI.search(text):
             called["pi"] = {0}
+        called |= {key: {0} for key in _NATURE.findall(text)}
         if temp := _TEMP.match(text):
             temperature = temp[1]
         elif _WARMTH.search(text):
@@ -239,8 +255,8 @@ def prelude(lines: Sequence[Line]) -> list[Line]:
         for name, (formals, body) in FUNCTIONS.items()
         if name not in defined and len(formals.split(",")) in called.get(name, ())
     ]
-    if "pi" in called and "pi" not in defined:
-        found.append(f".param pi={pi!r}")
+    wanted = (name for name in _CONSTANTS if name in called and name not in defined)
+    found += [f".param {name}={_CONSTANTS[name]!r}" for name in wanted]
     if "temp" in called and "temp" not in defined:
         found.append(f".param temp={temperature}")
     return [Line(text, lines[0].file, 1) for text in found]

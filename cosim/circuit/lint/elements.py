@@ -128,15 +128,23 @@ def node(name: str) -> str:
 
 def parse(lines: Sequence[Line]) -> Scope:
     """The netlist's scopes. Raises BadInput where lines are incomplete or do not nest."""
-    return _Parser(lines).top
+    found = _Parser(lines)
+    if found.scope is not found.top:  # perhaps a library's subcircuit that nobody needs
+        found = _Parser(lines, flat=True)
+    found.end()
+    return found.top
 
 
 class _Parser:
-    def __init__(self, lines: Sequence[Line]) -> None:
+    """With ``flat`` a subcircuit that has no .ends ends where the next one, or its file, does."""
+
+    def __init__(self, lines: Sequence[Line], flat: bool = False) -> None:
         self.top = self.scope = Scope("", lines[0])
         self.ifs: list[Line] = []
         self.outer_ifs: list[int] = []
         for line in lines[1:]:
+            if flat:
+                self._leave(line)
             if line.text.startswith(NO_MODEL):
                 name, _, reason = line.text.removeprefix(NO_MODEL).partition(" ")
                 self.scope.bad_models[name.lower()] = line, reason
@@ -151,6 +159,22 @@ class _Parser:
                     raise
                 else:
                     self.scope.broken = self.scope.broken or error
+        if flat:
+            self._leave(lines[0])
+
+    def _leave(self, line: Line) -> None:
+        """Leave a subcircuit without .ends before a line that begins another one or a file."""
+        new = line.file != self.scope.line.file or line.text.lower().startswith(".subckt")
+        if new and self.scope.parent is not None:
+            try:
+                self.end()
+            except BadInput as error:
+                self.scope.broken = self.scope.broken or error
+            del self.ifs[self.outer_ifs.pop() :]
+            self.scope = self.scope.parent
+
+    def end(self) -> None:
+        """Check that all is closed, and place the nodes."""
         if self.scope is not self.top:
             refuse(self.scope.line, f".subckt {shown(self.scope.name)} has no .ends")
         if self.ifs:
@@ -289,7 +313,8 @@ def _place(element: Element, scope: Scope) -> None:
         place = next(known, None)
         if place is None:
             # Which word was to be the model is a guess, for the message alone.
-            name = element.words[least + 1 if kind == "m" and len(element.words) > 4 else least]
+            from_there = element.words[least + (kind == "m" and len(element.words) > 4) :]
+            name = next((word for word in from_there if not word[0].isdigit()), from_there[0])
             scope.refuse_model(element, name)
         _split(element, place)
         element.model = element.words.pop(0)

@@ -67,7 +67,6 @@ _KEY = re.compile(r"\s*=(?!=)")
 _BODY = re.compile(r"\b[vi]\s*=(?!=)", re.IGNORECASE)
 _NEXT_KEY = re.compile(r"\b[a-z_]\w*\s*(?<![<>=!])=(?!=)", re.IGNORECASE)
 _SOURCE = re.compile(r"\b(?:value|vol|cur)\s*=?\s*$", re.IGNORECASE)
-_SPACED = re.compile(r"([a-z_]\w*)\s+\(", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -200,8 +199,6 @@ def check_names(scope: Scope, names: Names) -> None:
             pieces = "".join(str(piece.lastgroup)[0] for piece in _PIECE.finditer(expression))
             if pieces and (_BROKEN.search(pieces) or len(split_arguments(expression)) > 1):
                 refuse(line, f"{shown(expression.strip())} is no expression that ngspice can read")
-        if element is not None and element.kind == "b":
-            _check_blanks(line, own)
 
 
 def _check_source(line: Line, expression: str, parameters: set[str]) -> None:
@@ -270,14 +267,6 @@ def _misused(name: str, arguments: list[str], behavioural: bool | None) -> str |
         plainly = f"in a B source {name}() takes plain numbers only; write it in a .param line"
         return _LIMITER if name == "limit" else plainly
     return None
-
-
-def _check_blanks(line: Line, own: set[str]) -> None:
-    """In a B source ngspice takes a name before a blank for a parameter, and gives up."""
-    for match in _SPACED.finditer(unbraced(body(line))):
-        name = match[1].lower()
-        if name in own or name in BEHAVIOURAL or name == "pwl":
-            refuse(line, f"write {shown(name)}( without a blank, which ngspice cannot read here")
 
 
 def _counted(count: int) -> str:
