@@ -931,3 +931,34 @@ def test_gates_of_ltspice_are_what_their_names_say(gate: str, tmp_path: Path) ->
 def test_other_gates_are_refused(what: str, tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=r"own\.cir:8: A9 is no element that a netlist may have"):
         anew(tmp_path, f"A9 in b c 0 0 0 x 0 {what}")
+
+
+FAULTY = (
+    ".subckt fine a b\nR1 a b {r}\n.param r=1k\n.ends other\n"
+    ".subckt open a b\nR1 a b {1k\n.ends\n"
+    ".model twice D(Is=1n\n"
+    "* \x05 remark\r.ends\n"
+    ".subckt cut a b\nR1 a b 1k\n"
+    ".subckt last a b\nR1 a b 2k\n.ends\x1a\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("lines", "told"),
+    [
+        ("X1 in b fine\nX2 in b last", None),
+        ("X1 in b open", r"part\.lib:6: \{ is not closed"),
+        ("X1 in b cut", r"part\.lib:11: \.subckt cut has no \.ends"),
+        ("D1 in b twice", r"part\.lib:8: \( is not closed"),
+    ],
+)
+def test_faults_of_a_library_matter_where_they_are_used(
+    lines: str, told: str | None, tmp_path: Path
+) -> None:
+    (tmp_path / "part.lib").write_bytes(FAULTY.encode())
+    text = f"{lines}\nR9 b 0 1k\n.lib part.lib"
+    if told is None:
+        assert "r1 a b 2k" in anew(tmp_path, text)
+        return
+    with pytest.raises(BadInput, match=f"^{told}"):
+        anew(tmp_path, text)

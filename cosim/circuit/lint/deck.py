@@ -336,7 +336,8 @@ def _decoded(data: bytes, name: str) -> str:
     line's end, or does not show, is refused."""
     text = _text(data).replace("\x1a", " ").replace("\f", " ")  # DOS's and printers' ends
     for place, char in enumerate(text):
-        if char not in "\n\t" and category(char) in ("Cc", "Cf", "Cs", "Zl", "Zp"):
+        hidden = category(char) in ("Cf", "Cs", "Zl", "Zp") or char in "\v\x1c\x1d\x1e\x85"
+        if hidden or (char == "\0"):
             line = Line("", shown(name), text.count("\n", 0, place) + 1)
             refuse(line, f"the control character U+{ord(char):04X} cannot stand in a netlist")
     return text
@@ -434,7 +435,7 @@ def passed(line: Line) -> str | None:
     if not word and line.text[0].lower() not in ELEMENTS:
         name = line.text.split()[0]
         known = f" but {_GATES}" if name[0] in "aA" else ""
-        cure = "write it with R, C and B sources"
+        cure = f"{'take a model for PSpice, or ' * bool(known)}write it with R, C and B sources"
         return f"{UNKNOWN}{shown(name)} is no element that a netlist may have{known}; {cure}"
     return line.text
 

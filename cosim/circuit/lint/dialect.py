@@ -134,7 +134,7 @@ _NO_WIDTH = re.compile(
 )
 _WORD = re.compile(r"[^\s,]+")
 # NAME VALUE in a .param line without equals signs.
-_UNEQUAL = re.compile(r"(?<=\s)([a-z_]\w*)\s+(?=[{'\d.+-])", re.IGNORECASE)
+_UNEQUAL = re.compile(r"(?<=\s)([a-z_]\w*)\s+(?=[{'\d.+-]|[a-z_]\w*\()", re.IGNORECASE)
 _MODEL = re.compile(r"\.model\s+\S+\s+(?:ako:\s*\S+\s+)?(\w+)", re.IGNORECASE)
 _AKO = re.compile(r"\.model\s+\S+\s+ako:([^\s()]+)", re.IGNORECASE)
 _DEVICES = {"vswitch": "s", "sw": "s", "iswitch": "w", "csw": "w", "d": "d"}  # their letters

@@ -128,18 +128,26 @@ def node(name: str) -> str:
 
 def parse(lines: Sequence[Line]) -> Scope:
     """The netlist's scopes. Raises BadInput where lines are incomplete or do not nest."""
-    found = _Parser(lines)
-    if found.scope is not found.top:  # perhaps a library's subcircuit that nobody needs
+    try:
+        found = _Parser(lines)
+        found.end()
+    except _Unnested:  # perhaps by a library's subcircuit that nobody needs
         found = _Parser(lines, flat=True)
-    found.end()
+        found.end()
     return found.top
 
 
+class _Unnested(BadInput):
+    """Subcircuits do not nest."""
+
+
 class _Parser:
-    """With ``flat`` a subcircuit that has no .ends ends where the next one, or its file, does."""
+    """With ``flat`` a subcircuit that has no .ends ends where the next one begins or its file ends,
+    and a library's .ends without .subckt is dropped."""
 
     def __init__(self, lines: Sequence[Line], flat: bool = False) -> None:
         self.top = self.scope = Scope("", lines[0])
+        self.flat = flat
         self.ifs: list[Line] = []
         self.outer_ifs: list[int] = []
         for line in lines[1:]:
@@ -150,7 +158,8 @@ class _Parser:
                 self.scope.bad_models[name.lower()] = line, reason
                 continue
             try:
-                _check_brackets(line)
+                if not line.text.startswith(UNKNOWN):
+                    _check_brackets(line)
                 self._take(line)
             except BadInput as error:
                 if model := _MODEL.match(line.text):
@@ -176,7 +185,8 @@ class _Parser:
     def end(self) -> None:
         """Check that all is closed, and place the nodes."""
         if self.scope is not self.top:
-            refuse(self.scope.line, f".subckt {shown(self.scope.name)} has no .ends")
+            place, name = self.scope.line.place, shown(self.scope.name)
+            raise _Unnested(f"{place}: .subckt {name} has no .ends.")
         if self.ifs:
             refuse(self.ifs[-1], ".if has no .endif")
         self._place_nodes()
@@ -217,7 +227,9 @@ class _Parser:
 
     def _ends(self, line: Line, found: list[str]) -> None:
         if self.scope.parent is None:
-            refuse(line, ".ends has no .subckt")
+            if self.flat and line.file != self.top.line.file:
+                return
+            raise _Unnested(f"{line.place}: .ends has no .subckt.")
         if len(self.ifs) != self.outer_ifs.pop():
             refuse(line, ".if and .endif must stand in the same subcircuit")
         self.scope = self.scope.parent
