@@ -27,7 +27,10 @@ def pack(
         try:
             describe: Any = ctypes.CDLL(str(library.absolute())).model_describe
         except (OSError, AttributeError) as error:
-            raise BadInput(f"{plain(library)}: this is no model's library ({error}).") from None
+            cure = "compile the model together with fmu/thin/*.c"
+            raise BadInput(
+                f"{plain(library)}: this is no model's library; {cure} ({error})."
+            ) from None
         paths = (str(folder / "resources").encode(), str(about).encode())
         if not describe(version, *paths, why):
             raise BadInput(f"{plain(library)}: {plain(why.value.decode())}.")

@@ -57,7 +57,7 @@ def unknown_table(name: str) -> str:
     hint = (
         full_name(name)
         or suggestion(name, (*TABLES, "base", "description"))
-        or f" (tables: {', '.join(TABLES)}; above them: base, description)"
+        or f" (tables: {', '.join((*TABLES, *PORT_LISTS))}; above them: base, description)"
     )
     return f'there is no table "{plain(name)}"{hint}'
 

@@ -195,7 +195,8 @@ class Scene(BaseModel):
             raise fault("[[port]]: an end of the machine is given twice")
         for end in MACHINE_ENDS[:3]:
             if end not in names:
-                raise fault(f'[[port]]: nothing is joined to "{end}"')
+                way = "from" if end in MACHINE_ENDS[:2] else "to"
+                raise fault(f'there is no [[port]] with {way} = "{end}", which the machine needs')
         emf, current = names["machine.back_emf"], names["machine.current"]
         if "".join(current.lower().split()) != f"i({emf.lower()})":
             raise fault(

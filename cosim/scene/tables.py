@@ -659,10 +659,8 @@ class Port(Table):
         if (self.probe is None) == (self.origin is None):
             raise fault(f"the port {self.words} must have either probe or from")
         if (self.source is None) == (self.to is None) or (self.probe and self.source):
-            raise fault(
-                f"the port {self.words} must lead to one thing: from a probe to an input (to), "
-                "else to an input or to a source"
-            )
+            ends = "to, an input of an FMU" + " or source, one of the netlist" * (not self.probe)
+            raise fault(f"the port {self.words} must have one end: {ends}")
         if self.slope != "auto" and self.origin in (None, "drive"):
             raise fault(
                 f'the port {self.words}: slope = "{self.slope}" is for ports from an output of an '

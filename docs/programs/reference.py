@@ -263,7 +263,8 @@ ERRORS = ("BadInput", "SimulationFailed")
 
 def python() -> str:
     about = (
-        "Everything that the command does, from a script, a notebook or standard input. Scenes are "
+        "Everything that the command does, from a script, a notebook or standard input. The texts "
+        "are in the built pages (`make docs`) and in Python: `help(cosim.run)`. Scenes are "
         "given by name, as a path of a TOML file, or as what `load` returned. Overrides are a "
         'mapping `{"table.key": value}`, SI.'
     )

@@ -934,7 +934,7 @@ def test_other_gates_are_refused(what: str, tmp_path: Path) -> None:
 
 
 FAULTY = (
-    ".subckt fine a b\nR1 a b {r}\n.param r=1k\n.ends other\n"
+    '.subckt fine a b\nR1 a b {r}\n.param r=1k\n.ends other*A "B"\n'
     ".subckt open a b\nR1 a b {1k\n.ends\n"
     ".model twice D(Is=1n\n"
     "* \x05 remark\r.ends\n"

@@ -56,7 +56,7 @@ WRONG = {
         'to = "rotor.u"\nslope = "w"',
         r"slope = \"w\" is for ports from an output",
     ),
-    "no target": ('source = "Vemf"\n', "", r"rotor\.omega -> nothing must lead to one thing"),
+    "no target": ('source = "Vemf"\n', "", r"rotor\.omega -> nothing must have one end: to, an"),
     "a source twice": (
         "[coupling]",
         '[[port]]\nfrom = "rotor.y"\nsource = "vemf"\n[coupling]',

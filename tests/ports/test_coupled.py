@@ -267,8 +267,12 @@ def test_a_slope_by_which_nothing_changes_is_refused(tmp_path: Path, wrong: str)
     for given in ({}, {"coupling.method": "redo"}, macro):
         with pytest.raises(BadInput, match=r'Rotor\.fmu: .*"rotor\.omega": .*"difference"'):
             here(scene, given)
-    scene.write_text(scene.read_text().replace("scale", 'slope = "difference"\nscale', 1))
+    text = scene.read_text()
+    scene.write_text(text.replace("scale", 'slope = "difference"\nscale', 1))
     assert off(here(scene, {}), true) < 5e-5
+    scene.write_text(text.replace("scale", 'slope = "omega"\nscale', 1))
+    with pytest.raises(BadInput, match="does not change by its slope"):
+        here(scene, {})
 
 
 @pytest.mark.parametrize("tells", ["-9.81", "0.0"])

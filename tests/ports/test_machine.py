@@ -142,7 +142,7 @@ WRONG = {
     "two ends": ('source = "Vin"', 'source = "Vin"\n[[port]]\nfrom="drive"\nsource="Vx"', "twice"),
     "no current": (
         *('[[port]]\nprobe = "i(Vmot)"\nto = "machine.current"\n', ""),
-        'joined to "machine.current"',
+        'with to = "machine.current"',
     ),
     "another's current": (*('probe = "i(Vmot)"', 'probe = "i(Lcoil)"', 'probe = "i(Vmot)"'),),
     "a scale": ('source = "Vin"', 'source = "Vin"\nscale = 2', "scale must be 1"),

@@ -415,6 +415,8 @@ def passed(line: Line) -> str | None:
         refuse(line, "ng_script would make the netlist a script of commands")
     if word in DROPPED:
         return None
+    if word == ".ends":
+        return word  # libraries have remarks behind it
     if word and word not in KEPT:
         till = ", and all up to .endc: a scene tells what is run" if word == ".control" else ""
         refuse(line, f"{shown(word)} is not allowed in a netlist; leave it out{till}")

@@ -168,7 +168,8 @@ class Run:
         for _, name, place, read in self.plan.outputs():
             if read and not np.isfinite(self._rows[0][place]):
                 raise SimulationFailed(
-                    f"The output {name} is not a finite number at t = {self.state.time:.6g} s."
+                    f"The output {name} is not a finite number at t = {self.state.time:.6g} s: the "
+                    "FMU has failed, or the circuit has given it values without bound."
                 )
 
     def _refuse_what_is_said_wrongly(self) -> None:
@@ -181,7 +182,7 @@ class Run:
                 )
         for (side, name, _), told in zip(self.plan.told, self._slopes, strict=False):
             if told.wrong >= _WRONG:
-                words = 'does not change by the slope that it tells; take slope = "difference"'
+                words = 'does not change by its slope; take slope = "difference"'
                 raise side.of.bad(f'[[port]] from = "{name}": it {words}')
 
     def _fmu_failure(self) -> SimulationFailed:

@@ -177,5 +177,6 @@ def _number(text: str, part: str) -> float:
     except ValueError:
         value = float("nan")
     if not isfinite(value):
-        raise BadInput(f"--over {plain(text)}: “{plain(part.strip())}” is not a number.")
+        forms = "it must be KEY=START:STOP:COUNT or KEY=A,B,C"
+        raise BadInput(f"--over {plain(text)}: “{plain(part.strip())}” is not a number; {forms}.")
     return value
