@@ -55,7 +55,8 @@ class Plan:
         """Names of the sources that ports feed, as the scene spells them."""
         self._from: list[tuple[Side, Any]] = []
         self.told: list[tuple[Side, str, Any]] = []
-        """Outputs whose slopes are known, and held against what they do: FMU, port's ``from``, and the port's origin."""
+        """Outputs whose slopes are known, and held against what they do: FMU, port's ``from``, and
+        the port's origin."""
         self._fed: list[tuple[int, Side, Variable]] = []  # index of a source, and what feeds it
         self._needs: dict[_Of, set[_Of]] = {}
         """Variables on which each variable depends without delay: by the FMUs' own declaration of
