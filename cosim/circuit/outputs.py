@@ -212,11 +212,8 @@ def measured(
         if value is not None:
             values[f"meas.{each.name}"] = value
         else:
-            why = (
-                "what it needs has none"
-                if each.what == "param"
-                else "its event or interval is not in the run"
-            )
+            why = "its event or interval is not in the run"
+            why = "what it needs has none" if each.what == "param" else why
             notes.append(f"{each.line.place}: .meas {each.name} has no value: {why}.")
     return values, notes
 

@@ -156,7 +156,7 @@ R5 e 0 1k
 B7 g 0 V=atan2 (V(in),cos(w*time))
 I8 0 h TBL(-1 -2m, 0 0 1 1m)
 V8 h 0 SINE(0 2 1k)
-B8 in k R=if (V(in)>0,1k,3k)
+B8 in k R=if (V(in)>0,1k,3k) Rpar=1G
 V9 k 0 0
 .tran 3m
 .end

@@ -332,12 +332,11 @@ def _text(data: bytes) -> str:
 
 
 def _decoded(data: bytes, name: str) -> str:
-    """The text. Any other character than a line feed that some program takes for a
-    line's end, or does not show, is refused."""
+    """The text. A character that some program takes for a line's end, or does not show, is refused
+    unless it is a line feed; ``passed`` refuses other control characters outside comments."""
     text = _text(data).replace("\x1a", " ").replace("\f", " ")  # DOS's and printers' ends
     for place, char in enumerate(text):
-        hidden = category(char) in ("Cf", "Cs", "Zl", "Zp") or char in "\v\x1c\x1d\x1e\x85"
-        if hidden or (char == "\0"):
+        if char in "\0\v\x1c\x1d\x1e\x85" or category(char) in ("Cf", "Cs", "Zl", "Zp"):
             line = Line("", shown(name), text.count("\n", 0, place) + 1)
             refuse(line, f"the control character U+{ord(char):04X} cannot stand in a netlist")
     return text

@@ -17,15 +17,7 @@ from math import pi
 from typing import Any
 
 from cosim.circuit.lint.laplace import without_laplace
-from cosim.circuit.lint.lines import (
-    COPY,
-    MAX_LINE,
-    NO_MODEL,
-    Line,
-    reason_of,
-    refuse,
-    shown,
-)
+from cosim.circuit.lint.lines import COPY, MAX_LINE, NO_MODEL, Line, reason_of, refuse, shown
 from cosim.circuit.lint.words import closing, number, split_arguments, word_set, words
 from cosim.errors import BadInput
 
@@ -74,7 +66,7 @@ _DEFINED = re.compile(r"\.func\s+(\w+)|(\w+)\s*(?:\([^()]*\)\s*)?=(?!=)")
 _TABLE = re.compile(r"(?<![\w.])(?:table|tbl)\s*\(", re.IGNORECASE)
 _DRAWN = re.compile(r"^(i\S*)\s+(\S+)\s+(\S+)\s+(?:tbl|table)\s*=?\s*\(([^()]*)\)", re.I)
 """A source whose current is a table of its own voltage."""
-_BY_LAW = re.compile(r"^(b\S*)\s+(\S+)\s+(\S+)\s+r\s*=(?!=)\s*(.*)", re.IGNORECASE)
+_BY_LAW = re.compile(r"^(b\S*)\s+(\S+)\s+(\S+)\s+r\s*=(?!=)\s*(.*?)(?=\s+\w+\s*=(?!=)|$)", re.I)
 """LTspice's resistor of this law."""
 _PI = re.compile(r"(?<![\w.])pi(?!\w|\s*\()")
 _CONSTANTS = {"pi": pi, "boltz": 1.380649e-23, "echarge": 1.602176634e-19, "kelvin": -273.15}

@@ -156,8 +156,7 @@ class Names:
             if inner in self.definitions:
                 self.check_own(function.line, inner, given, behavioural, depth + 1)
             elif reason := _misused(inner, given, behavioural):
-                # Line 1, the title, stands for functions that the dialect has added.
-                added = function.line.number == 1
+                added = name in FUNCTIONS and function.line.number == 1  # by the dialect
                 where = f"the function {name} works only in B sources" if added else reason
                 refuse(line if added else function.line, where)
         # The functions that it calls are counted by now, but for itself, if it is recursive.
