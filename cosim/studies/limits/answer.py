@@ -176,9 +176,9 @@ def _as_it_is(study: Study, goal: Goal) -> Iterator[str]:
     if not goal.name.startswith("v_"):
         reached += f", where the part moves at {robust.v_average * 1e3:+.1f} mm/s"
     yield (
-        f"Unchanged, the device reaches {reached}; the worst error of ±2 % in the knobs gives "
-        f"{worst}. The best single setting there gives {single}, and {median} in the median over "
-        "such errors."
+        f"Unchanged, the device reaches {reached}, and {worst} with the worst error of ±2 % in the "
+        f"knobs. The setting that is best without errors gives {single} there, and {median} in the "
+        "median over them."
     )
 
 
@@ -211,13 +211,14 @@ def _slips(study: Study) -> str:
     told = []
     for way, end in (("up", 0), ("up", 1), ("down", 0)):
         values = [abs(slips[way][end]) for slips in study.slips]
-        over = f" ({span(values)} over the rigs)" if len(values) > 1 else ""
-        told.append(f"{values[0]:.0f}{over}")
+        told.append(f"{values[0]:.0f} m/s²" + f" ({span(values)})" * (len(values) > 1))
     up, rising, down = told
+    over = ", in brackets over the rigs" if len(study.slips) > 1 else ""
     return (
         f"While the part moves up it slips where the surface accelerates downwards at more than "
-        f"{up} m/s² or upwards at more than {rising}; while it moves down, downwards at more than "
-        f"{down}. A camera averages over 4 ms, so it reads less than the peak that makes it slip."
+        f"{up} or upwards at more than {rising}; while it moves down, downwards at more than "
+        f"{down}{over}. A camera averages over 4 ms, so it reads less than the peak that makes the "
+        "part slip."
     )
 
 
@@ -227,7 +228,7 @@ def _warmth(study: Study) -> str:
     current = np.sqrt(DRIVE_RANGE_HEAT / coil.resistance)
     return (
         f"The coil may make {DRIVE_RANGE_HEAT:.1f} W here, the most of the data sheet's range of "
-        f"drives, (5 V)²/7.1 Ω. That is no rating: its {current:.2f} A rms are "
+        f"drives, (5 V)²/7.1 Ω. That is no rating: it takes {current:.2f} A rms, "
         f"{current / RATED_CURRENT:.1f} times the current that the sheet names. By an estimate the "
         f"winding warms by {lift} in a lift of {LIFT:.0f} s, and by {ever} in continuous use."
     )
@@ -246,6 +247,6 @@ def _search(study: Study) -> str:
         f"Searches of {len(REPEATED)} changes were repeated with other seeds, {len(study.repeats)} "
         f"times in all: nine in ten robust values differ by at most, and in brackets all, {apart}; "
         f"the former is the noise. Of {len(asked)} points the circuit with more in it confirms "
-        f"{held} within 1 %. All measured trials have a rising sawtooth, of 51 Hz at most and but "
-        "for one of 30: what other shapes bring, and what is reached at more, is a prediction."
+        f"{held} within 1 %. All measured trials have a rising sawtooth, at 30 Hz at most "
+        "except one at 51 Hz: what other shapes and higher frequencies bring is a prediction."
     )

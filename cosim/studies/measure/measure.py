@@ -120,9 +120,9 @@ def report(found: Sample, given: int, seed: int, currents: tuple[float, float]) 
     )
     ends = np.quantile(found.targets, (0.05, 0.95), axis=0) * 1e3
     notes = [
-        f"{title}; the next best, {second.name}, to {brief(next_[0].width * 1e3)} mm/s. On "
-        f"{often:.0f} % of the rigs it leaves less than the median of the others. How: "
-        f"{first.how}.",
+        f"{title}; the next best ({second.how.partition(':')[0]}) to "
+        f"{brief(next_[0].width * 1e3)} mm/s. On {often:.0f} % of the rigs it leaves less than the "
+        f"median of the others. How: {first.how}.",
         f"That velocity is {ends[0, 0]:.1f} to {ends[1, 0]:.1f} mm/s as the device is, and "
         f"{ends[0, 1]:.1f} to {ends[1, 1]:.1f} mm/s with a falling sawtooth; of the latter's width "
         f"{other.name} leaves the least, {100.0 * leaves[1].width / now[1].width:.0f} %.",
