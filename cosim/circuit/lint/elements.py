@@ -129,12 +129,13 @@ def node(name: str) -> str:
 def parse(lines: Sequence[Line]) -> Scope:
     """The netlist's scopes. Raises BadInput where lines are incomplete or do not nest."""
     try:
-        found = _Parser(lines)
-        found.end()
+        return _Parser(lines).ended()
     except _Unnested:  # perhaps by a library's subcircuit that nobody needs
-        found = _Parser(lines, flat=True)
-        found.end()
-    return found.top
+        pass
+    try:
+        return _Parser(lines, flat=True).ended()
+    except _Unnested as error:
+        raise BadInput(str(error)) from None
 
 
 class _Unnested(BadInput):
@@ -175,21 +176,23 @@ class _Parser:
         """Leave a subcircuit without .ends before a line that begins another one or a file."""
         new = line.file != self.scope.line.file or line.text.lower().startswith(".subckt")
         if new and self.scope.parent is not None:
-            try:
-                self.end()
-            except BadInput as error:
-                self.scope.broken = self.scope.broken or error
+            self.scope.broken = self.scope.broken or self._open()
             del self.ifs[self.outer_ifs.pop() :]
             self.scope = self.scope.parent
 
-    def end(self) -> None:
-        """Check that all is closed, and place the nodes."""
+    def _open(self) -> "_Unnested":
+        """The error of a subcircuit that is not ended."""
+        line, name = self.scope.line, shown(self.scope.name)
+        return _Unnested(f"{line.place}: .subckt {name} has no .ends.")
+
+    def ended(self) -> Scope:
+        """The top level, its nodes placed. Raises BadInput where something is not closed."""
         if self.scope is not self.top:
-            place, name = self.scope.line.place, shown(self.scope.name)
-            raise _Unnested(f"{place}: .subckt {name} has no .ends.")
+            raise self._open()
         if self.ifs:
             refuse(self.ifs[-1], ".if has no .endif")
         self._place_nodes()
+        return self.top
 
     def _take(self, line: Line) -> None:
         found = words(line.text)
