@@ -106,9 +106,10 @@ def deck(
     external = {
         each.line: "\n".join(_external(each, through)) for each in top.elements if each.name in fed
     }
-    read_as, own = reading(every, len(words) if asked else 0), own_step(dropped)
+    read_as = reading(every, len(words) if asked else 0)
+    edge = edge_of(top, own_step(dropped), max_step, duration)
     return Deck(
-        text_of(lines[0], top, external, values, duration, reltol, max_step, own),
+        text_of(lines[0], top, external, values, duration, reltol, max_step, edge),
         {source.lower(): source[0].lower() for source in sources},
         tuple(vector for vector, _ in read_as),
         tuple(every),
@@ -116,7 +117,7 @@ def deck(
         tuple(without_effect(dropped)),
         tuple(device if k < len(words) else "" for k, (_, device) in enumerate(read_as)),
         tuple(_pulses(top, fed)),
-        _edge(top, own, max_step, duration),
+        edge,
     )
 
 
@@ -138,7 +139,7 @@ def own_step(dropped: Sequence[Line]) -> float | None:
     return None
 
 
-def _edge(top: Scope, own: float | None, max_step: float, duration: float) -> float | None:
+def edge_of(top: Scope, own: float | None, max_step: float, duration: float) -> float | None:
     """The length, s, of edges whose rise or fall time is not given; None without PULSE and EXP.
     Simulators differ in it; here it is the netlist's ``own`` step, or a run's longest, but at most
     1 % of the shortest on-time or period of a PULSE, or without ``own`` of the run's longest step
@@ -163,11 +164,10 @@ def text_of(
     duration: float,
     reltol: float,
     max_step: float,
-    own: float | None = None,
+    edge: float | None,
 ) -> str:
     """The deck for ngspice: the netlist with the lines of ``external`` sources replaced, ``values``
-    for the top level's parameters, and the analysis. The netlist's ``own`` step, s, is the length
-    of edges of its PULSE and EXP sources that have none, as far as it is short enough."""
+    for the top level's parameters, and the analysis; ``edge`` is that of :func:`edge_of`."""
     text = [title.text]
     for line, element, holder in top.order:
         if holder is top and line in external:
@@ -175,14 +175,13 @@ def text_of(
         elif all(each.used for each in holder.chain()):  # something calls the subcircuit
             free = (f" {key}=0" for key in sorted(holder.free) if line is holder.line)
             text.append("".join([written(line, element, values if holder is top else {}), *free]))
-    step = _edge(top, own, max_step, duration) or max_step
     min_break = max(_ONE_BREAK * max_step, _ONE_TIME * duration)
     text += [
         # Without norefvalue ngspice reads the CPU time at each step, to print its progress.
         f".options norefvalue reltol={reltol!r} minbreak={min_break!r}",
         # All vectors are sent step by step; ngspice is to keep none, which would take memory.
         ".save none",
-        f".tran {step!r} {duration!r} 0 {max_step!r}",
+        f".tran {edge or max_step!r} {duration!r} 0 {max_step!r}",
         ".end",
     ]
     return "\n".join(text)

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
-from cosim.circuit.joined import check_reading, own_parameters, own_step, reading, text_of
+from cosim.circuit.joined import check_reading, edge_of, own_parameters, own_step, reading, text_of
 from cosim.circuit.lint.checks import REQUIRED as AGREED
 from cosim.circuit.lint.deck import Line, read, refuse
 from cosim.circuit.lint.elements import Element, Scope
@@ -81,7 +81,9 @@ def prepare(scene: Scene) -> tuple[str, dict[str, str]]:
         _carry_inertia(external, title, present, emf)
     values = parameters(scene) | own_parameters(top, str(path), scene.circuit.param or {})
     steps = scene.circuit.reltol, scene.circuit.max_step
-    text = text_of(title, top, external, values, scene.run.duration, *steps, own)
+    duration = scene.run.duration
+    edge = edge_of(top, own, scene.circuit.max_step, duration)
+    text = text_of(title, top, external, values, duration, *steps, edge)
     for node in ("out", "sense"):
         if f"v({node})" not in words and node not in present:
             port = f', or a [[port]] to "machine.{node}"' if scene.renamed else ""

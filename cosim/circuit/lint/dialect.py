@@ -8,7 +8,6 @@ not installed on every machine, take time in each step, and round a table's corn
 """
 
 import re
-from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import reduce
@@ -51,7 +50,7 @@ FUNCTIONS = {
     "atan2": (
         "y,x",
         "ternary_fcn(x>=0,1,-1)*atan(y/(abs(x)+1e-99))"
-        "+ternary_fcn(x>=0,0,ternary_fcn(y<0,-1,1)*3.141592653589793)",
+        f"+ternary_fcn(x>=0,0,ternary_fcn(y<0,-1,1)*{pi!r})",
     ),
     "fabs": ("x", "abs(x)"),
     "cosim_switch": ("c,n,f,r,q", f"exp(-0.5*ln(r*q)-ln(r/q)*{_WAY}*(1.5-2*{_WAY}**2))"),
@@ -261,9 +260,8 @@ def in_ngspice_together(lines: Sequence[Line]) -> list[Line]:
     scopes, lines = [*_scopes(lines)], [*lines]
     _complete(lines, scopes)
     known: dict[_Key, str] = {}
-    names = defaultdict[_Key, set[str]](set)
-    for line, scope in zip(lines, scopes, strict=True):
-        names[scope].add(line.text.split(None, 1)[0].lower())
+    firsts = (line.text.split(None, 1)[0].lower() for line in lines)
+    elements = {*zip(scopes, firsts, strict=True)}
     for place, (line, scope) in enumerate(zip(lines, scopes, strict=True)):
         text = line.text.lower()
         if match := _SWITCHING.match(text):
@@ -281,7 +279,7 @@ def in_ngspice_together(lines: Sequence[Line]) -> list[Line]:
                 lines[place] = _unusable(line, error)
         elif text.startswith(".ic"):
             for name, current in _CURRENT.findall(text):
-                if name not in names[scope]:
+                if (scope, name) not in elements:
                     refuse(line, f"there is no inductor {shown(name)} here")
                 known[scope, name] = current
             lines[place] = replace(line, text=_CURRENT.sub("", line.text).strip())

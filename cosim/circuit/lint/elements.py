@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from itertools import accumulate
 from typing import NoReturn
 
-from cosim.circuit.lint.lines import COPY, NO_MODEL, UNKNOWN, Line, reason_of, refuse, shown
+from cosim.circuit.lint.lines import COPY, NO_MODEL, UNKNOWN, Line, refuse, shown
 from cosim.circuit.lint.words import definitions, split_assignments, words
 from cosim.errors import BadInput
 
@@ -37,7 +37,6 @@ _SPECIAL = {"poly", "table", "laplace", "freq", "value", "vol", "cur", "and", "n
             "vcvs", "vccs"}  # fmt: skip
 """First words of controlled sources that have no controlling nodes."""
 
-_MODEL = re.compile(r"\.model\s+([^\s=(){}']+)", re.IGNORECASE)
 _NESTING = re.compile(r"\.(?:subckt|ends|if|else|elseif|endif)\b", re.IGNORECASE)
 _FLAG = re.compile("=|^(?:off|thermal)$")
 """What a word behind the model has. ngspice 39 crashes on a bare number there, or drops it."""
@@ -78,8 +77,8 @@ class Scope:
     functions: set[str] = field(default_factory=set)
     models: dict[str, set[str]] = field(default_factory=dict)
     model_lines: dict[str, Line] = field(default_factory=dict)
-    bad_models: dict[str, tuple[Line, str]] = field(default_factory=dict)
-    """Models that cannot be used, by name, and the reasons."""
+    bad_models: dict[str, BadInput] = field(default_factory=dict)
+    """By name: what is wrong with models that cannot be used."""
     broken: BadInput | None = None
     """What is wrong with a line of it; libraries hold subcircuits that nobody needs."""
     names: set[str] = field(default_factory=set)
@@ -107,7 +106,7 @@ class Scope:
         """Raise the sentence on a model that ``model_types`` has not found."""
         for scope in self.chain():
             if name in scope.bad_models:
-                refuse(*scope.bad_models[name])
+                raise scope.bad_models[name]
         element.refuse(f": no model {shown(name)} is defined here{COPY}")
 
     def subcircuit(self, name: str) -> "list[Scope] | None":
@@ -156,15 +155,16 @@ class _Parser:
                 self._leave(line)
             if line.text.startswith(NO_MODEL):
                 name, _, reason = line.text.removeprefix(NO_MODEL).partition(" ")
-                self.scope.bad_models[name.lower()] = line, reason
+                self.scope.bad_models[name.lower()] = BadInput(f"{line.place}: {reason}.")
                 continue
             try:
                 if not line.text.startswith(UNKNOWN):
                     _check_brackets(line)
                 self._take(line)
             except BadInput as error:
-                if model := _MODEL.match(line.text):
-                    self.scope.bad_models[model[1].lower()] = line, reason_of(error, line)
+                word, *name = words(line.text)[:2]
+                if word == ".model" and name:
+                    self.scope.bad_models[name[0]] = error
                 elif self.scope is self.top or _NESTING.match(line.text):
                     raise
                 else:

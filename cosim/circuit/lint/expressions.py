@@ -193,14 +193,14 @@ def check_names(scope: Scope, names: Names) -> None:
                     refuse(line, reason)
             if in_source:
                 in_b = element is not None and element.kind == "b"  # where {e} is the .param
-                _check_source(line, unbraced(expression) if in_b else expression, parameters)
+                _check_words(line, unbraced(expression) if in_b else expression, parameters)
             _check_operators(line, expression)
             pieces = "".join(str(piece.lastgroup)[0] for piece in _PIECE.finditer(expression))
             if pieces and (_BROKEN.search(pieces) or len(split_arguments(expression)) > 1):
                 refuse(line, f"{shown(expression.strip())} is no expression that ngspice can read")
 
 
-def _check_source(line: Line, expression: str, parameters: set[str]) -> None:
+def _check_words(line: Line, expression: str, parameters: set[str]) -> None:
     """Refuse what ngspice takes for something else, or cannot read, in a behavioural source."""
     if "%" in expression:
         refuse(line, "% is not known in B sources; for x%y write x-y*floor(x/y)")
