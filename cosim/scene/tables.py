@@ -505,7 +505,7 @@ class Coupling(Table):
     """How circuit and mechanics are joined; ngspice leads. With [[fmu]] the default is "auto"."""
 
     method: str = _declared("step-locked", "Coupling", METHODS)
-    macro_step: float = _number(1e-4, "s", 1e-7, 1e-2, "Macro step; ends at jumps of the command")
+    macro_step: float = _number(1e-4, "s", 1e-7, 1.0, "Macro step; ends at jumps of the command")
     order: int = _number(
         1, "1", 0, 2, "Order of extrapolation: held, with the true slope, parabola"
     )

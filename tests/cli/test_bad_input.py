@@ -102,7 +102,7 @@ FILES = [
     ("[friction]\nmu_s = 0.5", "friction.mu_k = 0.59 must be at most friction.mu_s = 0.5"),
     ("[coupling]\nmethod = 'jacoby'", "did you mean jacobi?"),
     ("[coupling]\nmethod = 'iterated'", 'coupling.method = "iterated" repeats steps'),
-    ("[coupling]\nmacro_step = 0", "must be a number from 1e-07 to 0.01 s"),
+    ("[coupling]\nmacro_step = 0", "must be a number from 1e-07 to 1 s"),
     ("[coupling]\norder = 3", "must be a whole number from 0 to 2"),
     ("[run]\nsettle = 2", "run.settle = 2 s must be below run.duration = 2 s"),
     ("[run]\noutput_step = 3", "run.output_step = 3 s must be below run.duration"),

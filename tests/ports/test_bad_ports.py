@@ -369,7 +369,12 @@ def test_an_fmu_that_needs_its_tool_is_told(
 
 @pytest.mark.parametrize(
     ("status", "said"),
-    [(2, "it discards the step"), (3, "an error"), (4, "a fatal error"), (5, "background")],
+    [
+        (2, "it discards .*; one that takes steps of one length alone needs .*macro-steps"),
+        (3, "an error"),
+        (4, "a fatal error"),
+        (5, "background"),
+    ],
 )
 def test_an_fmu_that_fails_without_a_word(tmp_path: Path, status: int, said: str) -> None:
     recompiled(tmp_path, ("m->time = time + h;", f"if (time > 1e-4) return {status};"))
@@ -378,6 +383,15 @@ def test_an_fmu_that_fails_without_a_word(tmp_path: Path, status: int, said: str
         pytest.raises(SimulationFailed, match=rf"FMU rotor failed at t = .*: .*{said}"),
     ):
         run(motor(tmp_path))
+
+
+def test_macro_steps_have_one_length_to_the_bit(tmp_path: Path) -> None:
+    """Times are sums of steps, so that the difference of two is none of them."""
+    recompiled(tmp_path, ("m->time = time + h;", "if (h != 3e-4) return 2;"))
+    scene = motor(tmp_path, fixed=True)
+    given = {"coupling.macro_step": 3e-4, "run.duration": 0.03}
+    with in_place():
+        assert run(scene, given).summary["fmu_steps"] == 100
 
 
 @pytest.mark.parametrize("command", ["sweep", "tune"])

@@ -50,7 +50,8 @@ static const int64_t CHECKED = 20;
 /* After so many communication points states are seen to be restored at ever fewer of them. */
 
 static const double OTHER = 0.1, ROUNDING = 1e-9;
-/* Of a step's change and of the value: by how much an output of the same step is another one. */
+/* Of a step's change and of the value: by how much an output of the same step is another one. And of
+   a step's length: by how much one that ngspice has taken is another than was asked for. */
 
 static const double NOISE = 1e-6, FAR = 0.3;
 /* Of an output's largest value: a change that tells of its slope; of that: how far from it a slope is
@@ -272,11 +273,13 @@ static int restore_all(Ports *c)
 static int step_once(Ports *c, double time)
 {
     const double h = time - c->origin;
+    /* An FMU with steps of its own may refuse one that rounding has made longer or shorter. */
+    const double whole = fabs(h - c->macro_step) <= ROUNDING * h ? c->macro_step : h;
     for (Stranger *s = c->fmus; s < c->fmus + c->n_fmus; s++) {
         for (const Feed *f = s->feeds; f < s->feeds + s->n_feeds; f++)
             feed(c, f, time, h);
         s->fmu->time = c->origin;
-        if (!set_inputs(s) || !s->fmu->step(s->fmu, h) || !get_outputs(s) ||
+        if (!set_inputs(s) || !s->fmu->step(s->fmu, whole) || !get_outputs(s) ||
             (c->repeats && !refresh(c, s, time)))
             return fmu_failed(c, s);
         s->fmu->time = time;

@@ -47,8 +47,16 @@ _AGREEMENT = 2.0
 _WRONG = 12
 """As in ports.c: so many changes that disagree with the reported slope make it wrong."""
 
+_DISCARDED = 2
+"""Status of an FMU that does not make a step."""
+
+_ONE_LENGTH = (
+    "one that takes steps of one length alone needs coupling.method = "
+    '"macro-steps", with a coupling.macro_step that is a whole number of them'
+)
+
 _STATUSES = {
-    2: "it discards the step, or asks to end the run",
+    _DISCARDED: "it discards the step, or asks to end the run",
     3: "it has an error, and does not say which",
     4: "it has a fatal error, and does not say which",
     5: "it goes on with the step in the background, for which nobody waits",
@@ -189,8 +197,10 @@ class Run:
         side = self.plan.sides[self.state.failed]
         status = side.fmu.status
         said = side.instance.messages or [_STATUSES.get(status, f"status {status}")]
+        words = plain(said[-1].strip().rstrip("."), 400)
+        cure = f"; {_ONE_LENGTH}" if status == _DISCARDED else ""
         return SimulationFailed(
-            f"The FMU {side.name} failed at t = {self.state.told:.6g} s: {plain(said[-1], 400)}"
+            f"The FMU {side.name} failed at t = {self.state.told:.6g} s: {words}{cure}."
         )
 
     # The functions that ngspice's engine calls (see cosim.circuit.ngspice.Leader).
