@@ -454,7 +454,14 @@ def _lines(x: str, points: list[str]) -> str | None:
     rising = all(a is None or b is None or a < b for a, b in pairwise(known))
     if len(points) < 4 or len(points) % 2 or not rising:
         return None
-    return f"pwl(min(max({x}, {points[0]}), {points[-2]}), {', '.join(points)})"
+    if all(number(point) is not None for point in points):
+        return f"pwl(min(max({x}, {points[0]}), {points[-2]}), {', '.join(points)})"
+    # ngspice's pwl takes no parameters, and braces not within others.
+    plain = [f"({point.strip().strip('{}')})" for point in points]
+    law = plain[1]
+    for a, ya, b, yb in zip(plain[::2], plain[1::2], plain[2::2], plain[3::2], strict=False):
+        law += f"+({yb}-{ya})/({b}-{a})*(min(max({x},{a}),{b})-{a})"
+    return f"({law})"
 
 
 def _with_parts(text: str, kind: str) -> Iterator[str]:
