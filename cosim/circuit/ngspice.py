@@ -202,10 +202,18 @@ class Engine(Shared.NgSpiceShared):
         finally:
             self._looser = False
 
-    def ignored(self) -> list[str]:
-        """Parameters of models that ngspice does not know, from its messages."""
+    def remarks(self) -> Iterator[str]:
+        """Sentences on what ngspice has told of the last run: parameters of models that it does not
+        know, and a start that is no operating point."""
         said = "\n".join((*self._stderr, *self._stdout))
-        return [*dict.fromkeys(re.findall(r"unrecognized parameter \((\w+)\)", said))]
+        if unknown := dict.fromkeys(re.findall(r"unrecognized parameter \((\w+)\)", said)):
+            yield f"ngspice knows no {', '.join(unknown)} of a model, and ignored it."
+        if "Transient op finished" in said:
+            yield (
+                "ngspice found no operating point, as of a circuit that oscillates, and starts "
+                "where 10 us of a transient have led; .ic or .nodeset in the netlist says where to "
+                "start, run.settle leaves the beginning out."
+            )
 
     def fail(self, failure: BaseException) -> None:
         """Make ngspice give up; :meth:`transient` then raises ``failure``, which cannot pass C."""

@@ -9,6 +9,7 @@ import pytest
 
 import cosim
 from cosim.cli.main import main
+from cosim.errors import BeyondModel
 from cosim.files.resources import circuits
 from cosim.toolchain.processes import in_place
 from tests.ports.foreign import build
@@ -189,3 +190,35 @@ def test_a_carrier_as_fast_as_the_rows_is_told(tmp_path: Path) -> None:
     fine = agreed(tmp_path, run_duration=0.05, run_output_step=2e-6)
     assert not any("run.output_step" in note for note in fine.summary["notes"])
     assert fine.summary["v_average"] == pytest.approx(quick.summary["v_average"], rel=1e-3)
+
+
+OSCILLATOR = """
+Vrel rel 0 1
+Rrel rel cap 1k
+Crel cap 0 1u
+Srel cap 0 cap 0 dump
+.model dump SW(vt=0.5 vh=0.2 ron=1 roff=1meg)
+.meas tran turns TRIG v(cap) VAL=0.5 RISE=2 TARG v(cap) VAL=0.5 RISE=12
+"""
+
+
+@pytest.mark.filterwarnings(f"ignore::{BeyondModel.__module__}.{BeyondModel.__name__}")
+@pytest.mark.parametrize("beside", ["the machine", "ports alone"])
+def test_a_circuit_without_operating_point_begins_as_in_ngspice(folder: Path, beside: str) -> None:
+    """A relaxation oscillator between 0.3 and 0.7 V: R C ln(7/3) to fill, and r C ln(7/3) to
+    empty."""
+    for path in folder.glob("*.cir"):
+        path.write_text(path.read_text().replace(".end\n", f"{OSCILLATOR}.end\n"))
+    if beside == "the machine":
+        result = agreed(folder, circuit_max_step=1e-6, run_duration=0.02)
+    else:
+        (folder / "bare.toml").write_text(
+            '[circuit]\nmodel = "file"\nnetlist = "bare.cir"\n'
+            '[[port]]\nfrom = "drive"\nsource = "Vin"\n[run]\nduration = 0.02\nsettle = 0.0\n'
+        )
+        (folder / "bare.cir").write_text(f"t\nVin in 0 0\nRin in 0 1k\n{OSCILLATOR}.end\n")
+        with in_place():
+            result = cosim.run(folder / "bare.toml", {"circuit.max_step": 1e-6})
+    period = 1001e-6 * np.log(7.0 / 3.0)
+    assert result.summary["meas.turns"] == pytest.approx(10 * period, rel=5e-3)
+    assert sum("found no operating point" in note for note in result.summary["notes"]) == 1

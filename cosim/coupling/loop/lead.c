@@ -16,6 +16,10 @@
 static const double ON_TIME = 1e-13;
 /* s; ngspice's own sums of steps reach a time of ours only within rounding */
 
+static const double OPERATING_END = 1e-5 * (1.0 - 1e-15);
+/* s; to here, but for rounding, lead the steps (OPTRAN) by which ngspice seeks an operating point that
+   it finds in no other way. It cuts a step beyond it to end shortly before, and never comes to it. */
+
 static const double PAST_IMPACT = 1e-9;
 /* s; a step that is to end on an impact ends so much later, so that it holds the impact */
 
@@ -44,6 +48,7 @@ static const double SETTLED_SHARE = 0.0025; /* of the command's range: an answer
 static const int64_t ATTEND_EVERY = 4096; /* attempted steps; some ten milliseconds */
 
 static Lead *run; /* the one under way, or NULL */
+int loop_sent;
 static int64_t late; /* ms; when Python is to be called again, at the latest */
 
 static int going(const Lead *c)
@@ -266,6 +271,8 @@ EXPORT int lead_source(double *voltage, double time, const char *node, int ident
 {
     (void)ident, (void)user;
     Lead *c = run;
+    if (!loop_sent)
+        time = 0.0;
     if (!c)
         return ports_source(voltage, time, node);
     if (!going(c)) {
@@ -289,6 +296,7 @@ EXPORT int lead_data(VectorValues *data, int n, int ident, void *user)
 {
     (void)n, (void)ident, (void)user;
     Lead *c = run;
+    loop_sent = 1;
     if (!c)
         return ports_data(data);
     double *values = row_of(c) + LOG_SAVED;
@@ -298,11 +306,24 @@ EXPORT int lead_data(VectorValues *data, int n, int ident, void *user)
     return 0;
 }
 
+/* The step from `time` that does not lead beyond `end`, if it lies ahead, by as little as rounding. */
+static double within(double step, double time, double end)
+{
+    if (time >= end || time + step <= end)
+        return step;
+    step = end - time;
+    return time + step <= end ? step : nextafter(step, 0.0);
+}
+
 EXPORT int lead_step(double time, double *delta, double old_delta, int redo, int ident,
                      int location, void *user)
 {
     (void)ident, (void)user;
     Lead *c = run;
+    if (!loop_sent) {
+        *delta = within(*delta, time, OPERATING_END);
+        return 0;
+    }
     if (!c)
         return ports_step(time, delta, old_delta, redo, location);
     if (!going(c))
@@ -331,6 +352,7 @@ void lead_begin(Lead *c)
     c->near_step = c->time_constant / c->fineness;
     c->answered = c->time_constant * log(1.0 / SETTLED_SHARE); /* V1 leaves 0 at once */
     late = loop_milliseconds() + LOOP_PATIENCE;
+    loop_sent = 0;
     run = c;
 }
 

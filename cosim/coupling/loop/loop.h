@@ -350,6 +350,10 @@ EXPORT void ports_finish(Ports *c);
 /* How often the vector at this place among those sent has turned back since the run began. */
 EXPORT int ports_turns(int place);
 
+extern int loop_sent;
+/* Whether ngspice has sent values in the run under way. Before that it may seek the operating point by
+   steps of its own in time, from 0 on, which are not the run's. */
+
 /* What ngspice calls while no Lead is under way. */
 int ports_source(double *value, double time, const char *node);
 int ports_data(const VectorValues *data);

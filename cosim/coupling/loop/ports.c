@@ -797,6 +797,7 @@ void ports_begin(Ports *c)
     c->learn = c->n_throughs > 0;
     c->jump = c->driven ? piece_at(&c->drive, 0.0)->jump : INFINITY;
     late = loop_milliseconds() + LOOP_PATIENCE;
+    loop_sent = 0;
     run = c;
 }
 

@@ -174,10 +174,9 @@ judged from so many changes on."""
 
 
 def _notes(run: Run, odd: list[str]) -> Iterator[str]:
-    """Sentences on ignored parameters, ringing, values that are no numbers, outputs that repeated
+    """Sentences on what ngspice told, ringing, values that are no numbers, outputs that repeated
     steps change, and FMUs with steps of their own; ``odd`` names signals that were left out."""
-    if ignored := engine().ignored():
-        yield f"ngspice knows no {', '.join(ignored)} of a model, and ignored it."
+    yield from engine().remarks()
     often = run.steps * run.plan.scene.circuit.max_step / run.state.duration
     if often > _OFTEN and run.steps > _LONG:
         turns = {

@@ -23,6 +23,7 @@ def drive(scene: Scene, recorder: Recorder) -> Driven:
     from cosim.circuit.false_cycles import refuse_false
     from cosim.circuit.netlist import asked_for
     from cosim.circuit.outputs import measured
+    from cosim.coupling.loop.lead import engine
     from cosim.coupling.loop.macro_steps import coupled
 
     lead = coupled(scene, recorder)
@@ -34,7 +35,7 @@ def drive(scene: Scene, recorder: Recorder) -> Driven:
         _refuse_foreign_coil(scene, log)
         asks, notes = asked_for(scene)
         values, without = measured(asks, log["time"], log)
-        notes += without
+        notes += [*without, *engine().remarks()]
         notes += _folded(scene, log, recorder.time)
     electric, waves = _electrics(scene, command(scene), log, recorder.time)
     return Driven(
