@@ -89,15 +89,7 @@ def deck(
     lines, dropped = read(path)
     asks = measures(dropped)
     name = plain(path)
-    found = {element.name: element for element in parse(lines).elements}
-    for source in sources:
-        if source.lower() not in found or source[0].lower() not in "vi":
-            able = sorted(each for each in found if each[0] in "vi")
-            hint = suggestion(source.lower(), able) or f" (it has {', '.join(able) or 'none'})"
-            if lines[0].text.lower().split()[1] == source.lower():
-                hint = "; the first line of the netlist, where it stands, is the title"
-            shown = f'{called[0]} = "{plain(source)}"'
-            raise BadInput(ended(f"{name}: {shown} must be a V or I source of its own{hint}"))
+    check_sources(path, lines, sources, called[0])
     top, every = check_reading(
         path, lines, words, asks, [[source.lower() for source in sources]], asked, called[1]
     )
@@ -200,6 +192,27 @@ def _external(element: Element, through: Sequence[tuple[str, str]]) -> Iterator[
     yield f"{name} {plus} {between} external"
     for k, _ in shares:
         yield f"Vcosim_gain{k} cosim_gain{k} 0 external"
+
+
+def check_sources(
+    path: Path,
+    lines: Sequence[Line],
+    sources: Sequence[str],
+    called: str = "[[port]] source",
+    kinds: str = "vi",
+) -> None:
+    """Raise BadInput for one of the ``sources`` that the netlist does not have, or not as one of
+    these kinds."""
+    found = {element.name: element for element in parse(lines).elements}
+    for source in sources:
+        if source.lower() not in found or source[0].lower() not in kinds:
+            able = sorted(each for each in found if each[0] in kinds)
+            hint = suggestion(source.lower(), able) or f" (it has {', '.join(able) or 'none'})"
+            if lines[0].text.lower().split()[1] == source.lower():
+                hint = "; the first line of the netlist, where it stands, is the title"
+            must = f"must be a {' or '.join(kinds.upper())} source of its own"
+            what = f'{called} = "{plain(source)}" {must}{hint}'
+            raise BadInput(ended(f"{plain(path)}: {what}"))
 
 
 def check_reading(

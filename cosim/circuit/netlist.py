@@ -10,7 +10,15 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
-from cosim.circuit.joined import check_reading, edge_of, own_parameters, own_step, reading, text_of
+from cosim.circuit.joined import (
+    check_reading,
+    check_sources,
+    edge_of,
+    own_parameters,
+    own_step,
+    reading,
+    text_of,
+)
 from cosim.circuit.lint.checks import REQUIRED as AGREED
 from cosim.circuit.lint.deck import Line, read, refuse
 from cosim.circuit.lint.elements import Element, Scope
@@ -110,6 +118,7 @@ def _checked(
 ) -> tuple[Line, Scope, list[str], float | None]:
     lines, dropped = read(path)
     required = [[renamed[end].lower() for end in _SOURCES]] if renamed else AGREED
+    check_sources(path, lines, [renamed[end] for end in _SOURCES if renamed], kinds="v")
     top, every = check_reading(path, lines, words, measures(dropped), required)
     return lines[0], top, every, own_step(dropped)
 
@@ -136,11 +145,11 @@ def _external_sources(elements: Sequence[Element], renamed: Mapping[str, str]) -
     present = {element.name for element in elements}
     agreed: Sequence[str] = [renamed[end].lower() for end in _SOURCES] if renamed else ()
     agreed = agreed or next(names for names in AGREED if present >= set(names))
-    found = [element for element in elements if element.name in agreed]
-    for element in found:
-        if element.kind != "v":
-            element.refuse(" must be a V source, since a [[port]] joins it to the machine")
-    return {each.line: " ".join([each.name, *each.nodes, "external"]) for each in found}
+    return {
+        each.line: " ".join([each.name, *each.nodes, "external"])
+        for each in elements
+        if each.name in agreed
+    }
 
 
 def _carry_inertia(external: dict[Line, str], title: Line, present: set[str], emf: str) -> None:

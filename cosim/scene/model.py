@@ -360,8 +360,8 @@ class Scene(BaseModel):
     @property
     def files(self) -> dict[str, str]:
         """The paths of the files that the scene names, by key."""
-        given = {key: getattr(getattr(self, table), key) for table, key in PATHS}
-        given |= {f"fmu.{fmu.name}": fmu.file for fmu in self.fmu}
+        given = {f"{table}.{key}": getattr(getattr(self, table), key) for table, key in PATHS}
+        given |= {f"fmu.{fmu.name}.file": fmu.file for fmu in self.fmu}
         return {key: path for key, path in given.items() if path is not None}
 
     @property

@@ -3,6 +3,7 @@
 Modules that only the worker needs are imported there, since their import takes a while.
 """
 
+import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 
 from cosim.arrays import Array
 from cosim.circuit.lint.deck import named
+from cosim.errors import BadInput, plain
 from cosim.files import spill
 from cosim.files.resources import circuits
 from cosim.files.spill import Packed, place
@@ -23,6 +25,10 @@ from cosim.waveforms.result import Result
 def one_run(scene: Scene, progress: Progress, alone: bool = False) -> Result:
     """The result of :func:`cosim.simulation.here.simulate_here`, in this process or a worker.
     Raises SimulationFailed also where the worker dies or hangs."""
+    for key, path in scene.files.items():
+        if not os.path.exists(path) and (key != "circuit.netlist" or scene.rung.own_netlist):
+            words = f'{plain(key)} = "{plain(path)}": there is no such file'
+            raise BadInput(f"scene {scene.name}: {words}.")
     if in_a_worker() or not scene.rung.ngspice:
         from cosim.simulation.here import simulate_here
 
@@ -60,7 +66,7 @@ def bounds(scene: Scene) -> Bounds:
     """The files that a worker for the scene may read, and its libraries; scenes with the same files
     can share a worker. Raises BadInput where ngspice is missing."""
     files = scene.files
-    netlist = files.pop("netlist", None)
+    netlist = files.pop("circuit.netlist", None)
     circuit = named(Path(netlist)) if netlist else [circuits()]
     reads = *map(str, circuit), *filter(_is_meant, files.values())
     return Bounds(reads, place(), ngspice_library(), _load)

@@ -64,7 +64,7 @@ WRONG = {
     ),
     "two origins": ("probe =", 'from = "drive"\nprobe =', r"must have either probe or from"),
     "a method": ('"auto"', '"jacobi"', r"coupling\.method = \"jacobi\" must be one of"),
-    "a file": ("Rotor.fmu", "Rotor2.fmu", r"Rotor2\.fmu: cannot be read"),
+    "a file": ("Rotor.fmu", "Rotor2.fmu", r"fmu\.rotor\.file = .*Rotor2\.fmu\": there is no"),
     "no FMU": ("Rotor.fmu", "bridge.cir", r"bridge\.cir: this is no FMU"),
     "a key": ("source =", "sourec =", r"there is no key \"sourec\" in \[\[port\]\]; did you mean"),
 }
@@ -278,7 +278,7 @@ def test_what_is_no_file_of_an_fmu_is_told(
     with in_place():
         assert main(["run", str(scene), "--out", str(tmp_path / "out")]) == 2
     told = capsys.readouterr().err.strip()
-    assert (told.count("\n") == 0 and ".fmu: " in told) or kind == "too long"
+    assert (told.count("\n") == 0 and ".fmu" in told) or kind == "too long"
     assert not (tmp_path / "out").exists()
 
 

@@ -148,7 +148,7 @@ WRONG = {
     "another's current": (*('probe = "i(Vmot)"', 'probe = "i(Lcoil)"', 'probe = "i(Vmot)"'),),
     "a scale": ('source = "Vin"', 'source = "Vin"\nscale = 2', "scale must be 1"),
     "an unknown end": ("machine.current", "machine.force", "must be one of from"),
-    "no source": ('"Vin"', '"Vout"', "the sources Vmot and Vout"),
+    "no source": ('"Vin"', '"Vout"', 'source = "Vout" must be a V source of its own'),
     "a resistor": ('"Vin"', '"Rleft"', "must be a V source"),
     "no node": ('"v(hot)"', '"v(hott)"', "no node hott"),
 }
