@@ -93,9 +93,10 @@ def without_effect(dropped: Sequence[Line]) -> Iterator[str]:
             yield f"{line.place}: .step has no effect: a run takes {takes}; {several}."
         elif word in _ANALYSES or without or (match and match[1] not in (None, "tran")):
             what = f"{word} {without[0]}" if without else word
+            cure = ", in which .ic v(NODE)=... sets voltages" if without else ""
             yield (
                 f"{line.place}: {what} has no effect: a run is a transient analysis "
-                "that begins at the operating point."
+                f"that begins at the operating point{cure}."
             )
 
 

@@ -112,7 +112,7 @@ def _sweep(folder: Path) -> tuple[dict[str, Any], list[Run]]:
     if not numbers:
         raise BadInput(f"{plain(path)}: no point of this sweep has a number.")
     best = "v_average" if "v_average" in numbers else numbers[0]
-    ways = [axes[0], axes[1] if len(axes) > 1 else best, best]
+    ways = [axes[1], axes[0], best] if len(axes) > 1 else [axes[0], best, best]  # as the figure
     axes = axes if grid.ndim > 1 else []
     cloud = {"columns": columns, "keys": axes[2:], "ways": ways, "grid": axes}
     shown = {"title": data.attrs["title"], "cloud": cloud | {"count": grid.size, "family": None}}

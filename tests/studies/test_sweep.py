@@ -349,7 +349,7 @@ def test_no_point_could_be_run(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert (tmp_path / "sweep.nc").exists()
 
 
-def test_a_figure_of_ones_own_circuit_says_which_mean_changes_most() -> None:
+def test_a_figure_of_ones_own_circuit_is_about_the_first_port() -> None:
     resistance = xr.DataArray(
         [0.5, 1.0, 2.0], dims="R", attrs={"key": "circuit.param.R", "units": "?"}
     )
@@ -359,12 +359,31 @@ def test_a_figure_of_ones_own_circuit_says_which_mean_changes_most() -> None:
     }
     failure = {"failure": ("R", ["", "", "no such circuit"])}
     drawn = figure.draw(xr.Dataset(means | failure, {"R": resistance}), "motor")
-    message = "motor: Vemf.mean from 1 to 5 V over circuit.param.R, 3 points, 1 failed (×)"
-    assert drawn.get_suptitle() == message
+    said = "rotor.omega.mean from 90 at circuit.param.R = 1 to 100 at circuit.param.R = 0.5"
+    assert drawn.get_suptitle().replace("\n", " ") == f"motor: {said} 3 points, 1 failed (×)"
     first = drawn.axes[0]
     assert first.get_xlabel() == "circuit.param.R"
     assert [axis.get_title("left") for axis in drawn.axes] == ["rotor.omega.mean", "Vemf.mean [V]"]
     assert [line.get_marker() for line in first.lines] == [".", "x"]  # one failed
+
+
+def test_a_sweep_of_ones_own_circuit_over_two_keys_is_a_map_and_a_range() -> None:
+    keys = {"R": [0.5, 1.0, 2.0], "drop": [1.0, 3.0]}
+    speed = np.array([[4.0, 9.0], [5.0, np.nan], [6.0, 1.0]])
+    data = xr.Dataset(
+        {
+            "rotor.omega.mean": (tuple(keys), speed, {"units": "rad/s"}),
+            "failure": (tuple(keys), np.where(np.isfinite(speed), "", "no")),
+        },
+        {name: (name, at, {"key": f"t.{name}", "units": "?"}) for name, at in keys.items()},
+        {"title": "motor"},
+    )
+    said = "from 1 rad/s at t.R = 2, t.drop = 3 to 9 rad/s at t.R = 0.5, t.drop = 3"
+    assert f"rotor.omega.mean     {said}" in table(data)
+    drawn = figure.draw(data, "motor")
+    assert said in drawn.get_suptitle().replace("\n", " ")
+    colours = np.asarray(drawn.axes[0].collections[0].get_array()).reshape(3, 2)
+    assert np.nan_to_num(colours.astype(float)).tolist() == np.nan_to_num(speed).tolist()
 
 
 def test_a_kill_leaves_no_older_figure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,7 +15,7 @@ from cosim.files.picture import Picture, grid
 from cosim.scene import firmware
 from cosim.studies.plots import headline
 from cosim.studies.sweep.dataset import FAILURE, POINT
-from cosim.studies.sweep.report import at, fastest, setting
+from cosim.studies.sweep.report import at, fastest, of_ports, range_of, setting
 from cosim.waveforms.quantities import UNITLESS, label, printed
 from cosim.waveforms.storage import swept
 
@@ -51,27 +51,24 @@ def draw(data: xr.Dataset, title: str) -> Picture:
     varied = [key for key in keys if data.sizes.get(key, 1) > 1] or keys[:1]
     failed = int(np.sum(data[FAILURE].values != ""))
     words = f"{data[FAILURE].size} points" + (f", {failed} failed (×)" if failed else "")
-    means = [str(name) for name in data if str(name).endswith(".mean")]
-    if "v_average" not in data and means:  # a scene with its own FMUs
-        quantities = [Quantity(name, name, data[name].attrs.get("units", "")) for name in means]
-        figure = _over_keys(data, [(keys[0], quantity) for quantity in quantities], ".")
-        headline(
-            figure, f"{title}: {_greatest_change(data, quantities)}, {words}".replace("$", "\\$")
-        )
-        return figure
+    quantities = _quantities(data)
     if POINT in data.dims:
-        figure = _over_keys(data, [(key, V_AVERAGE) for key in keys], ".")
+        figure = _over_keys(data, [(key, quantities[0]) for key in keys], ".")
     elif len(varied) == 1:
-        panels = [(varied[0], quantity) for quantity in _quantities(data)]
+        panels = [(varied[0], quantity) for quantity in quantities]
         figure = _over_keys(data.sortby(varied[0]), panels, ".-")
     else:
         y, x, *fixed = varied
-        shown = _at_the_fastest(data, y, x)
-        figure = _maps(shown, y, x)
+        shown = _at_the_best(data, y, x, quantities[0])
+        figure = _maps(shown, y, x, quantities)
         if fixed:
             words += f"; drawn at {', '.join(_setting(shown[key]) for key in fixed)}, the best"
         if (np.abs(_values(shown, V_AVERAGE)) < STAYS * V_AVERAGE.scale).any():
             words += f"; dashes: the part stays (below {STAYS * 1e3:g} mm/s)"
+    if of_ports(data):
+        said = range_of(data, quantities[0].name, 4) or "all failed"
+        headline(figure, f"{title}: {quantities[0].name} {said}\n{words}".replace("$", "\\$"))
+        return figure
     best = [
         f"fastest {way}, {data['v_average'].values.ravel()[place] * 1e3:+.3g} mm/s, at "
         f"{at(data, place, 4)}"
@@ -83,7 +80,9 @@ def draw(data: xr.Dataset, title: str) -> Picture:
 
 def _quantities(data: xr.Dataset) -> list[Quantity]:
     """The velocity, and each other quantity that some point has: with rigid walls and with the fast
-    solver there are no peaks of the acceleration."""
+    solver there are no peaks of the acceleration. Of a scene with ports of its own, their means."""
+    if means := of_ports(data):
+        return [Quantity(name, name, data[name].attrs.get("units", "")) for name in means[:MOST]]
     return [V_AVERAGE, *(x for x in OTHERS if np.isfinite(_values(data, x).values).any())]
 
 
@@ -91,20 +90,6 @@ def _values(data: xr.Dataset, quantity: Quantity) -> xr.DataArray:
     if quantity.name not in data:
         return xr.full_like(data[FAILURE], np.nan, dtype=np.float64)
     return data[quantity.name] * quantity.scale
-
-
-def _greatest_change(data: xr.Dataset, quantities: Sequence[Quantity]) -> str:
-    """In words, the number with the greatest change relative to its largest magnitude."""
-    changes: list[tuple[float, str]] = []
-    for name, _, unit, _ in quantities[:MOST]:
-        known = data[name].values[np.isfinite(data[name].values)]
-        if known.size:
-            low, high = known.min(), known.max()
-            said = "" if unit in UNITLESS else f" {printed(unit)}"
-            share = (high - low) / (max(abs(low), abs(high)) or 1.0)
-            changes.append((share, f"{name} from {low:.4g} to {high:.4g}{said}"))
-    keys = ", ".join(data[name].key for name in swept(data))
-    return f"{max(changes, default=(0.0, 'all failed'))[1]} over {keys}"
 
 
 def _panels(titles: Sequence[str]) -> tuple[Picture, list[Axes]]:
@@ -133,17 +118,18 @@ def _over_keys(data: xr.Dataset, panels: Sequence[tuple[str, Quantity]], style: 
     return figure
 
 
-def _at_the_fastest(data: xr.Dataset, y: str, x: str) -> xr.Dataset:
-    """The points over two keys, all others being as at the fastest point."""
-    place = next((place for _, place in fastest(data)), 0)
+def _at_the_best(data: xr.Dataset, y: str, x: str, first: Quantity) -> xr.Dataset:
+    """The points over two keys, all others being as where ``first`` is greatest."""
+    values = _values(data, first).values
+    place = np.nanargmax(values) if np.isfinite(values).any() else 0
+    place = next((place for _, place in fastest(data)), place)
     best = dict(zip(data[FAILURE].dims, np.unravel_index(place, data[FAILURE].shape), strict=True))
     others = {name: at for name, at in best.items() if name not in (x, y)}
     return data.isel(others).sortby([x, y]).transpose(y, x)
 
 
-def _maps(data: xr.Dataset, y: str, x: str) -> Picture:
+def _maps(data: xr.Dataset, y: str, x: str, quantities: Sequence[Quantity]) -> Picture:
     """A map of each quantity, with the failed points and where the part stays."""
-    quantities = _quantities(data)
     figure, axes = _panels([quantity.title for quantity in quantities])
     xs, ys = data[x].values, data[y].values
     rows, columns = np.nonzero(data[FAILURE].values != "")
@@ -156,7 +142,8 @@ def _maps(data: xr.Dataset, y: str, x: str) -> Picture:
             ends = known.min(initial=-STAYS), known.max(initial=STAYS)
             shown.set(cmap="RdBu", norm=TwoSlopeNorm(0.0, *map(float, ends)))
             _boundary(axis, xs, ys, values / quantity.scale)
-        figure.colorbar(shown, ax=axis, label=f"[{quantity.unit}]")
+        unit = "" if quantity.unit in UNITLESS else f"[{printed(quantity.unit)}]"
+        figure.colorbar(shown, ax=axis, label=unit)
         axis.plot(xs[columns], ys[rows], **FAILED)
         _name(axis.xaxis, data[x])
         _name(axis.yaxis, data[y])

@@ -14,6 +14,9 @@ from cosim.waveforms.storage import swept
 MOST_REASONS = 5
 """Different reasons of failures that are printed, the most frequent ones."""
 
+MOST_MEANS = 3
+"""Means of a scene with ports of its own that are printed, those of the first ports."""
+
 MOTION = "motion_fastest_{}"
 """Attribute of a sweep's dataset with the kind of motion at the fastest point "up" or "down"."""
 MOTIONS = "motion_at_random"
@@ -27,7 +30,8 @@ BEYOND = 0.02
 
 
 def table(data: xr.Dataset) -> str:
-    """The greatest transport up and down, with the settings, and why points failed."""
+    """The greatest transport up and down, or the range of what ports join, with the settings, and
+    why points failed."""
     reasons = Counter(str(text) for text in data[FAILURE].values.ravel() if text)
     count = data[FAILURE].size
     name = str(data.attrs["title"]).removeprefix("Sweep of ")
@@ -39,6 +43,9 @@ def table(data: xr.Dataset) -> str:
         lines.append(f"  fastest {way:<5}{speed * 1e3:+10.3f} mm/s{judged} at {at(data, place)}")
         if motion := data.attrs.get(MOTION.format(way)):
             lines.append(f"    its motion   {motion}")
+    for name in of_ports(data)[:MOST_MEANS]:
+        if said := range_of(data, name):
+            lines.append(f"  {name:<20} {said}")
     if MOTIONS in data.attrs:
         lines.append(f"  motion at points at random: {data.attrs[MOTIONS]}")
     lines += _judgement(data) if JUDGED in data else []
@@ -48,6 +55,26 @@ def table(data: xr.Dataset) -> str:
             f"  and for {len(reasons) - MOST_REASONS} more reasons: see {FAILURE} in sweep.nc"
         )
     return "\n".join(lines)
+
+
+def of_ports(data: xr.Dataset) -> list[str]:
+    """The means of a scene with ports of its own, those of the first ports first."""
+    own = "v_average" not in data
+    return [name for name in map(str, data) if own and name.endswith(".mean")]
+
+
+def range_of(data: xr.Dataset, name: str, digits: int = 6) -> str:
+    """In words, the least and the greatest value of a number, with their settings."""
+    values = data[name].values.ravel()
+    if not np.isfinite(values).any():
+        return ""
+    unit = data[name].attrs.get("units", "1")
+    if np.nanmin(values) == np.nanmax(values):
+        return f"{with_unit(float(np.nanmin(values)), unit, 4)} at all points"
+    return "from " + " to ".join(
+        f"{with_unit(float(values[place]), unit, 4)} at {at(data, place, digits)}"
+        for place in (np.nanargmin(values), np.nanargmax(values))
+    )
 
 
 def fastest(data: xr.Dataset) -> list[tuple[str, np.intp]]:
@@ -86,8 +113,8 @@ def _judgement(data: xr.Dataset) -> list[str]:
 
 def at(data: xr.Dataset, place: np.intp, digits: int = 6) -> str:
     """The settings of the point with the flat index ``place``, with what knobs set."""
-    v = data["v_average"]
-    point = v[dict(zip(v.dims, np.unravel_index(place, v.shape), strict=True))]
+    every = data[FAILURE]
+    point = every[dict(zip(every.dims, np.unravel_index(place, every.shape), strict=True))]
     found = [setting(point[name], digits) for name in swept(data)]
     meant = [  # only the axes of the sweep have an attribute "key"
         f"{name} {with_unit(float(value), value.units, 4)}"
