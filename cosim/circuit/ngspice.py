@@ -13,7 +13,7 @@ Importing this module loads PySpice, which is slow: only workers import it.
 import logging
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from functools import cache
 from typing import Any, Protocol
@@ -44,6 +44,9 @@ _NOISE = re.compile(
 
 
 _SINGULAR = re.compile(r"singular matrix: check (nodes? \S+(?: and \S+)?)", re.IGNORECASE)
+
+_DRAWN = re.compile(r"(?<![\w.])(?:a?gauss|a?unif|trnoise|trrandom)(?=\s*\()", re.IGNORECASE)
+_SEEDED = re.compile(r"^\.opt\w*\s(?:.*\s)?seed\s*=", re.IGNORECASE | re.MULTILINE)
 
 LOOSER = "abstol=1e-8 vntol=1e-5 chgtol=1e-11"
 """A, V, C. ngspice's defaults 1 pA, 1 uV and 10 fC are meant for integrated circuits: where amperes
@@ -98,6 +101,8 @@ class Engine(Shared.NgSpiceShared):
     sent: tuple[str, ...] = ()
     """The names of all vectors of the run, in the order in which ngspice sends them."""
     _looser = False
+    _random: Collection[str] = ()
+    """What draws random numbers in the netlist of the run."""
     poisoned = False
     """ngspice has asked to exit: its library in this process can run nothing any more."""
 
@@ -159,6 +164,9 @@ class Engine(Shared.NgSpiceShared):
 
     def _load(self, deck: str) -> None:
         given = deck.splitlines()
+        self._random = dict.fromkeys(match[0].lower() for match in _DRAWN.finditer(deck))
+        if self._random and not _SEEDED.search(deck):
+            given.insert(-1, ".options seed=1")
         if self._looser:
             given.insert(-1, f".options {LOOSER}")
         lines = [_ffi.new("char[]", line.encode()) for line in (*given, "")]
@@ -208,6 +216,13 @@ class Engine(Shared.NgSpiceShared):
         said = "\n".join((*self._stderr, *self._stdout))
         if unknown := dict.fromkeys(re.findall(r"unrecognized parameter \((\w+)\)", said)):
             yield f"ngspice knows no {', '.join(unknown)} of a model, and ignored it."
+        if noise := [name for name in self._random if name.startswith("tr")]:
+            yield f"the values of {' and '.join(noise)} are random, and differ from run to run."
+        elif self._random:
+            yield (
+                f"the random numbers of {', '.join(self._random)} are the same in each run; "
+                ".options seed=N in the netlist draws others (it is 1 without)."
+            )
         if "Transient op finished" in said:
             yield (
                 "ngspice found no operating point, as of a circuit that oscillates, and starts "

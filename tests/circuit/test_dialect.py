@@ -964,3 +964,22 @@ def test_faults_of_a_library_matter_where_they_are_used(
         return
     with pytest.raises(BadInput, match=f"^{told}"):
         anew(tmp_path, text)
+
+
+@needs.ngspice_library
+def test_random_numbers_are_within_their_range_and_the_same_in_each_run(tmp_path: Path) -> None:
+    """LTspice's mc(x, y) is x (1 - y) to x (1 + y), flat(x) -x to x, gauss(x) of that deviation."""
+    law = "{mc(1k,0.05)}", "{flat(3)+1}", "{gauss(1e-3)+1}"
+    text = "t\nV1 in 0 0\nR9 in 0 1k\n" + "".join(
+        f"Vr{k} n{k} 0 {value}\nR{k} n{k} 0 1k\n.meas tran m{k} AVG V(n{k})\n"
+        for k, value in enumerate(law)
+    )
+    first, again, other = (
+        summary_of(tmp_path, f"{text}{line}") for line in ("", "", ".options seed=5\n")
+    )
+    values = [first[f"meas.m{k}"] for k in range(3)]
+    assert 950.0 < values[0] < 1050.0 and abs(values[1] - 1.0) < 3.0
+    assert 0.0 < abs(values[2] - 1.0) < 5e-3
+    assert [again[f"meas.m{k}"] for k in range(3)] == values
+    assert all(other[f"meas.m{k}"] != value for k, value in enumerate(values))
+    assert any("are the same in each run" in note for note in first["notes"])

@@ -46,6 +46,8 @@ FUNCTIONS = {
     "stp": ("x", "u(x)"),
     "buf": ("x", "u(x-0.5)"),
     "inv": ("x", "u(0.5-x)"),
+    "mc": ("x,y", "aunif(x,x*(y))"),
+    "flat": ("x", "aunif(0,x)"),
     "hypot": ("x,y", "sqrt(x*x+y*y)"),
     "atan2": (
         "y,x",
@@ -71,6 +73,9 @@ _PI = re.compile(r"(?<![\w.])pi(?!\w|\s*\()")
 _CONSTANTS = {"pi": pi, "boltz": 1.380649e-23, "echarge": 1.602176634e-19, "kelvin": -273.15}
 """LTspice's, in J/K, C and degrees Celsius; of ``pi`` B sources know themselves."""
 _NATURE = re.compile(r"(?<![\w.])(boltz|echarge|kelvin)(?!\w|\s*\()")
+
+_SIGMA = re.compile(r"(?<![\w.])gauss\s*\(([^(),]*)\)", re.IGNORECASE)
+"""LTspice's, of the standard deviation alone."""
 
 _MAKERS = word_set("mfg pn type pppkg iave vpk vceo icrating qg")
 _REMARKS = {
@@ -168,6 +173,7 @@ def _pointed(expression: str) -> str:
 def in_ngspice(line: Line) -> list[Line]:
     """The line in ngspice's dialect, as one or more lines."""
     text = _KIND.sub(r"\1", _NOISELESS.sub("", line.text.translate(_LETTERS)))
+    text = _SIGMA.sub(r"agauss(0,\1,1)", text)
     if drawn := _DRAWN.match(text):
         name, plus, minus, points = drawn.groups()
         points = ",".join(_WORD.findall(points))
