@@ -24,6 +24,10 @@ static const double NEAR = 1e-12; /* of the time: nearer ones are one */
 static const double BEYOND = 10.0; /* steps by which ngspice's end lies behind the experiment's */
 static const double FOREVER = 1e9; /* steps; ngspice's end where the experiment has none */
 
+static const double OPERATING_END = 1e-5 * (1.0 - 1e-15);
+/* s; to here, but for rounding, lead the steps (OPTRAN) by which ngspice seeks an operating point that
+ * it finds in no other way. It cuts a step beyond it to end shortly before, and never comes to it. */
+
 enum { IMPORTERS, SPICES };
 
 typedef struct {
@@ -41,6 +45,7 @@ static struct {
     pthread_cond_t changed;
     pthread_key_t mark; /* of ngspice's thread: its end is known when that is taken away */
     int turn, stopping, ended, gone, given_up;
+    int sent; /* whether ngspice has sent values: before that it may seek the operating point */
     int open; /* whether there is an instance */
     double until;
     int *places; /* of each variable among the values sent; -1: not a vector */
@@ -151,6 +156,7 @@ static int on_vectors(SentVectors *all, int id, void *user)
 static int on_data(SentValues *all, int n, int id, void *user)
 {
     (void)n, (void)id, (void)user;
+    s.sent = 1;
     for (int k = 1; s.run && k <= ports.model.count; k++)
         if (s.places[k] >= 0)
             s.run->v[k] = all->values[s.places[k]]->real;
@@ -168,7 +174,7 @@ static int on_source(double *value, double time, char *name, int id, void *user)
         while (*word && tolower((unsigned char)*at) == *word)
             at++, word++;
         if (!*word && !*at)
-            *value = s.run->v[k] + s.run->v[k + 1] * fmax(0.0, time - s.run->time);
+            *value = s.run->v[k] + (s.sent ? s.run->v[k + 1] * fmax(0.0, time - s.run->time) : 0.0);
     }
     return 0;
 }
@@ -192,6 +198,14 @@ static int on_sync(double time, double *delta, double last_delta, int redo, int 
                    void *user)
 {
     (void)last_delta, (void)redo, (void)id, (void)user;
+    if (!s.sent) {
+        if (time < OPERATING_END && time + *delta > OPERATING_END) {
+            *delta = OPERATING_END - time;
+            if (time + *delta > OPERATING_END)
+                *delta = nextafter(*delta, 0.0);
+        }
+        return 0;
+    }
     if (place != 0 || s.stopping)
         return 0;
     if (time >= s.until * (1.0 - NEAR))
@@ -316,7 +330,7 @@ static int start(Run *run)
     char go[] = "bg_run";
     s.run = run;
     s.turn = SPICES;
-    s.stopping = s.unknown = s.given_up = 0;
+    s.stopping = s.unknown = s.given_up = s.sent = 0;
     s.ended = s.gone = 1;
     s.until = 0.0;
     s.said[0] = '\0';

@@ -159,6 +159,24 @@ def test_it_computes_what_plain_ngspice_does(tmp_path: Path, version: str) -> No
         assert np.abs(power - wanted).max() < 1e-3 * np.abs(wanted).max()
 
 
+def test_a_circuit_without_operating_point_begins_as_in_ngspice(tmp_path: Path) -> None:
+    """A relaxation oscillator between 0.3 and 0.7 V: R C ln(7/3) to fill, r C ln(7/3) to empty."""
+    path = tmp_path / "oscillator.cir"
+    path.write_text(
+        "t\nVs s 0 1\nR1 s c 1k\nC1 c 0 1u\nS1 c 0 c 0 dump\n"
+        ".model dump SW(vt=0.5 vh=0.2 ron=1 roff=1meg)\n.end\n"
+    )
+    given = ["--output", "v(c)", "--max-step", "1e-6", "--out", str(tmp_path)]
+    assert main(["fmu", "netlist", str(path), *given]) == 0
+    fmu, h = str(tmp_path / "oscillator.fmu"), 1e-5
+    run = {"path": fmu, "h": h, "n": 1000, "outputs": ["v(c)"], "inputs": {}, "start": {}}
+    result = stepped(run | {"stop": 0.01})
+    v = np.array(result["found"][0])[:, 0] - 0.5
+    (up,) = np.nonzero((v[:-1] < 0) & (v[1:] >= 0))
+    crossed = h * (up - v[up] / (v[up + 1] - v[up]))
+    assert np.diff(crossed).mean() == pytest.approx(1001e-6 * np.log(7.0 / 3.0), rel=5e-3)
+
+
 def test_one_instance_after_the_other_but_not_two_at_once(tmp_path: Path) -> None:
     """The end of an instance leaves no thread, and the next one starts afresh; the second of two,
     even of another netlist, is refused in a message."""
