@@ -148,6 +148,15 @@ def edge_of(top: Scope, own: float | None, max_step: float, duration: float) -> 
     return min(lengths)
 
 
+_RANDOM = re.compile(r"(?<![\w.])(?:a?gauss|a?unif|trnoise|trrandom)(?=\s*\()", re.IGNORECASE)
+_SEEDED = re.compile(r"^\.opt\w*\s(?:.*\s)?seed\s*=", re.IGNORECASE | re.MULTILINE)
+
+
+def drawn(text: str) -> list[str]:
+    """What draws random numbers in a netlist."""
+    return [*dict.fromkeys(match[0].lower() for match in _RANDOM.finditer(text))]
+
+
 def text_of(
     title: Line,
     top: Scope,
@@ -159,7 +168,8 @@ def text_of(
     edge: float | None,
 ) -> str:
     """The deck for ngspice: the netlist with the lines of ``external`` sources replaced, ``values``
-    for the top level's parameters, and the analysis; ``edge`` is that of :func:`edge_of`."""
+    for the top level's parameters, a seed for random numbers if the netlist has none, and the
+    analysis; ``edge`` is that of :func:`edge_of`."""
     text = [title.text]
     for line, element, holder in top.order:
         if holder is top and line in external:
@@ -167,6 +177,9 @@ def text_of(
         elif all(each.used for each in holder.chain()):  # something calls the subcircuit
             free = (f" {key}=0" for key in sorted(holder.free) if line is holder.line)
             text.append("".join([written(line, element, values if holder is top else {}), *free]))
+    lines = "\n".join(text)
+    if drawn(lines) and not _SEEDED.search(lines):
+        text.append(".options seed=1")
     min_break = max(_ONE_BREAK * max_step, _ONE_TIME * duration)
     text += [
         # Without norefvalue ngspice reads the CPU time at each step, to print its progress.

@@ -20,6 +20,7 @@ from typing import Any, Protocol
 
 from PySpice.Spice.NgSpice import Shared
 
+from cosim.circuit.joined import drawn
 from cosim.circuit.lint.words import sent
 from cosim.errors import BadInput, SimulationFailed, plain
 from cosim.toolchain.libraries import ngspice_library
@@ -44,9 +45,6 @@ _NOISE = re.compile(
 
 
 _SINGULAR = re.compile(r"singular matrix: check (nodes? \S+(?: and \S+)?)", re.IGNORECASE)
-
-_DRAWN = re.compile(r"(?<![\w.])(?:a?gauss|a?unif|trnoise|trrandom)(?=\s*\()", re.IGNORECASE)
-_SEEDED = re.compile(r"^\.opt\w*\s(?:.*\s)?seed\s*=", re.IGNORECASE | re.MULTILINE)
 
 LOOSER = "abstol=1e-8 vntol=1e-5 chgtol=1e-11"
 """A, V, C. ngspice's defaults 1 pA, 1 uV and 10 fC are meant for integrated circuits: where amperes
@@ -164,9 +162,7 @@ class Engine(Shared.NgSpiceShared):
 
     def _load(self, deck: str) -> None:
         given = deck.splitlines()
-        self._random = dict.fromkeys(match[0].lower() for match in _DRAWN.finditer(deck))
-        if self._random and not _SEEDED.search(deck):
-            given.insert(-1, ".options seed=1")
+        self._random = drawn(deck)
         if self._looser:
             given.insert(-1, f".options {LOOSER}")
         lines = [_ffi.new("char[]", line.encode()) for line in (*given, "")]
