@@ -40,6 +40,7 @@ def opened(scene: str, overrides: Iterable[str] = ()) -> tuple[str, dict[str, di
     if found.circuit.netlist and not found.has_ports:
         rest = found.table("circuit")
         own = {key: rest.pop(key, None) for key in ("netlist", "reltol", "max_step")}
+        rest.pop("save", None)  # the page has the machine's own curves only
         own["netlist"] = str(Path(own["netlist"]).absolute())
         own |= {f"param.{key}": v for key, v in (rest.pop("param", None) or {}).items()}
         own = {"circuit.model": "file"} | {f"circuit.{key}": v for key, v in own.items()}

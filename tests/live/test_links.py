@@ -124,9 +124,11 @@ def test_parameters_of_an_own_netlist_go_with_it() -> None:
         "circuit.model=file",
         f"circuit.netlist={netlist}",
         "circuit.param.switch_resistance=2",
+        'circuit.save=["v(left)"]',
     ]
     link, known = opened("paper", given)
-    assert known["own"]["circuit.param.switch_resistance"] == 2 and "param" not in link
+    assert known["own"]["circuit.param.switch_resistance"] == 2
+    assert "param" not in link and "save" not in link  # the page has no curve for it
 
 
 def test_a_record_with_a_gap_keeps_its_times(tmp_path: Path) -> None:
