@@ -13,7 +13,7 @@ Importing this module loads PySpice, which is slow: only workers import it.
 import logging
 import os
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from typing import Any, Protocol
@@ -99,8 +99,8 @@ class Engine(Shared.NgSpiceShared):
     sent: tuple[str, ...] = ()
     """The names of all vectors of the run, in the order in which ngspice sends them."""
     _looser = False
-    _random: Collection[str] = ()
-    """What draws random numbers in the netlist of the run."""
+    _deck = ""
+    """The last run's."""
     poisoned = False
     """ngspice has asked to exit: its library in this process can run nothing any more."""
 
@@ -162,7 +162,7 @@ class Engine(Shared.NgSpiceShared):
 
     def _load(self, deck: str) -> None:
         given = deck.splitlines()
-        self._random = drawn(deck)
+        self._deck = deck
         if self._looser:
             given.insert(-1, f".options {LOOSER}")
         lines = [_ffi.new("char[]", line.encode()) for line in (*given, "")]
@@ -212,11 +212,12 @@ class Engine(Shared.NgSpiceShared):
         said = "\n".join((*self._stderr, *self._stdout))
         if unknown := dict.fromkeys(re.findall(r"unrecognized parameter \((\w+)\)", said)):
             yield f"ngspice knows no {', '.join(unknown)} of a model, and ignored it."
-        if noise := [name for name in self._random if name.startswith("tr")]:
+        random = drawn(self._deck)
+        if noise := [name for name in random if name.startswith("tr")]:
             yield f"the values of {' and '.join(noise)} are random, and differ from run to run."
-        elif self._random:
+        elif random:
             yield (
-                f"the random numbers of {', '.join(self._random)} are the same in each run; "
+                f"the random numbers of {', '.join(random)} are the same in each run; "
                 ".options seed=N in the netlist draws others (it is 1 without)."
             )
         if "Transient op finished" in said:

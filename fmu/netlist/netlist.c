@@ -199,11 +199,8 @@ static int on_sync(double time, double *delta, double last_delta, int redo, int 
 {
     (void)last_delta, (void)redo, (void)id, (void)user;
     if (!s.sent) {
-        if (time < OPERATING_END && time + *delta > OPERATING_END) {
-            *delta = OPERATING_END - time;
-            if (time + *delta > OPERATING_END)
-                *delta = nextafter(*delta, 0.0);
-        }
+        if (time < OPERATING_END)
+            *delta = fmin(*delta, OPERATING_END - time);
         return 0;
     }
     if (place != 0 || s.stopping)

@@ -306,22 +306,14 @@ EXPORT int lead_data(VectorValues *data, int n, int ident, void *user)
     return 0;
 }
 
-/* The step from `time` that does not lead beyond `end`, if it lies ahead, by as little as rounding. */
-static double within(double step, double time, double end)
-{
-    if (time >= end || time + step <= end)
-        return step;
-    step = end - time;
-    return time + step <= end ? step : nextafter(step, 0.0);
-}
-
 EXPORT int lead_step(double time, double *delta, double old_delta, int redo, int ident,
                      int location, void *user)
 {
     (void)ident, (void)user;
     Lead *c = run;
     if (!loop_sent) {
-        *delta = within(*delta, time, OPERATING_END);
+        if (time < OPERATING_END)
+            *delta = fmin(*delta, OPERATING_END - time);
         return 0;
     }
     if (!c)
