@@ -205,7 +205,7 @@ def test_tune_theory_and_compare(tmp_path: Path, result: cosim.Result) -> None:
         assert isinstance(found.plot(), Figure)
 
 
-@pytest.mark.parametrize("way", ["stdin", "script"])
+@pytest.mark.parametrize("way", ["stdin", pytest.param("script", marks=pytest.mark.slow)])
 def test_without_a_main_guard(way: str, tmp_path: Path) -> None:
     """A netlist of one's own and a sweep, which both run in processes of their own."""
     program = PROGRAM.format(own=OWN, short=SHORT)

@@ -246,7 +246,7 @@ def test_a_record_is_laid_over(tab: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("ported", [False, True])
+@pytest.mark.parametrize("ported", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_an_own_circuit_is_run_by_the_server(tmp_path: Path, ported: bool) -> None:
     """Also one with names of its own, which ports join to the machine."""
     netlist = circuits() / "examples" / "audio_amplifier.cir"

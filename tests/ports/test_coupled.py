@@ -550,6 +550,7 @@ def test_a_jump_of_the_drive_on_an_edge_of_the_circuit_is_one_time(
             assert np.abs(times[np.searchsorted(times, edges - 1e-12)] - edges).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_edges_that_rounding_parts_are_one(tmp_path: Path) -> None:
     """From 1/16 s on, times are further apart than what ngspice takes for one with such steps."""
     scene, times = motor(tmp_path), {"run.duration": 0.066, "run.settle": 0.0}

@@ -56,7 +56,7 @@ def peak(*overrides: str) -> float:
         ("ideal", (2, 20), 5e-5),
         pytest.param("limited", (20, 200), 5e-5, marks=pytest.mark.slow),
         pytest.param("amplifier", (10, 100), 5e-5, marks=pytest.mark.slow),
-        ("amplifier", (2, 20), 5e-4),
+        pytest.param("amplifier", (2, 20), 5e-4, marks=pytest.mark.slow),
     ],
 )
 def test_memory_is_bounded(model: str, durations: tuple[float, float], rows: float) -> None:

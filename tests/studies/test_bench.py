@@ -22,6 +22,7 @@ def test_reference_is_met_by_the_rungs() -> None:
         assert own_error(circuit, circuit) < allowed
 
 
+@pytest.mark.slow
 def test_peers_solve_the_same_problem() -> None:
     """Each comes as near to the reference as its method can; a wrong model does not."""
     netlist = brief("circuit.reltol=1e-8", "circuit.max_step=1e-4")

@@ -106,6 +106,7 @@ def test_the_fit_with_the_spring_loaded_plate(fitted: TrialResults):
     check_bounds(fitted)
 
 
+@pytest.mark.slow
 def test_trials_that_are_not_determined_have_no_force_and_no_path(some: Path):
     """The rest are predicted within their slides to not much more than the noise of the tracks.
     Published forces are taken by wish alone."""

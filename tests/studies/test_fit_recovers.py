@@ -95,6 +95,7 @@ def test_two_trials_of_one_rig_give_their_friction_back(tmp_path: Path) -> None:
     assert found["plate_over_kinetic"] == pytest.approx(truths[0]["ratio"], abs=0.12)
 
 
+@pytest.mark.slow
 def test_frames_without_noise_do_not_mislead(tmp_path: Path) -> None:
     """How a slide begins is not modelled to the digits of a table: taken so, they are 11 % off."""
     truths = [made(tmp_path, name, noise=0.0) for name in ("05", "09")]
@@ -103,6 +104,7 @@ def test_frames_without_noise_do_not_mislead(tmp_path: Path) -> None:
         assert holds(row, truth)
 
 
+@pytest.mark.slow
 def test_a_narrow_ridge_is_found(tmp_path: Path) -> None:
     """Where so much friction is the plate's, both frictions can be exchanged for each other but for
     what sharp frames tell: with their noise taken ten times too high it was 39 % off."""
@@ -114,6 +116,7 @@ def test_a_narrow_ridge_is_found(tmp_path: Path) -> None:
     assert row["misfit_um"] < 2 * NOISE * 1e6
 
 
+@pytest.mark.slow
 def test_missing_frames_change_the_friction_little(tmp_path: Path) -> None:
     """A tenth of the frames has no height of one of the bodies, some in the middle of slides."""
     truth = made(tmp_path, "09")

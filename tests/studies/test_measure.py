@@ -202,6 +202,7 @@ def test_an_interval_stands_on_enough_rigs() -> None:
     assert weights.sum() ** 2 / (weights**2).sum() >= FEWEST
 
 
+@pytest.mark.slow
 def test_worth() -> None:
     """A measurement of the target itself against one of something else, and nothing; 90 % of the
     intervals hold the truth."""

@@ -53,6 +53,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
 
 
+@pytest.mark.slow
 def test_the_same_sources_give_the_same_bytes(copy: Path) -> None:
     done = make(copy)
     assert done.returncode == 0, done.stderr

@@ -124,7 +124,8 @@ def test_names_of_expressions_stay_apart(tmp_path: Path) -> None:
     assert main(["new", str(scene), "--kind", "circuit"]) == 0
     words = ["v(out,c1)", "v(out)-v(c1)", "v(out)+v(c1)", "2*v(out)", "v(out) * i(Vemf)"]
     words.append("(v(out)-v(c1))*(v(out)-v(c1))/7.1")
-    run = make_run(tmp_path, str(scene), f"circuit.save={json.dumps(words)}")
+    short = ("run.duration=0.05", "run.settle=0")
+    run = make_run(tmp_path, str(scene), f"circuit.save={json.dumps(words)}", *short)
     data = xarray.load_dataset(run / "waveforms.nc")
     with (run / "waveforms.csv").open(newline="") as file:
         head, *rows = csv.reader(file)
