@@ -4,15 +4,14 @@ The compiled loop releases Python's global lock while it runs, and so does a thr
 its worker process. Results equal those of single runs to the last bit.
 """
 
-import threading
 from collections.abc import Callable, Generator, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from itertools import islice
 from queue import SimpleQueue
 from typing import Any, NamedTuple, TypeVar
 
 from cosim.errors import BadInput
+from cosim.toolchain import processes
 
 PATIENCE = 15.0
 """s, within which the cluster must answer."""
@@ -32,26 +31,12 @@ class Pool(NamedTuple):
     """Most calls that are submitted and not ended."""
 
 
-class _Ended(Exception):
-    """Raised in calls whose result is no longer wanted."""
-
-
 @contextmanager
 def threads(common: Any, count: int) -> Iterator[Pool]:
     """``count`` threads. Each call gets ``common`` as its first argument, and as its last one a
     progress function, which ends the call once the ``with`` block has ended."""
-    ended = threading.Event()
-
-    def progress(time: float) -> None:
-        if ended.is_set():
-            raise _Ended
-
-    pool = ThreadPoolExecutor(count)
-    try:
+    with processes.threads(count) as (pool, progress):
         yield Pool(lambda call, *given: pool.submit(call, common, *given, progress), AHEAD * count)
-    finally:
-        ended.set()
-        pool.shutdown(cancel_futures=True)
 
 
 @contextmanager

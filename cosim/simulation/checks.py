@@ -17,10 +17,8 @@ the simpler circuit, near a border between two kinds; chaos that dies out before
 """
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import replace
-from threading import Event
 from typing import Any
 
 import numpy as np
@@ -34,7 +32,7 @@ from cosim.scene.describe import KEYS
 from cosim.simulation.elsewhere import one_run
 from cosim.simulation.fidelity import LEAST, Fidelity, relative_error
 from cosim.simulation.here import few_rows, simulate_here
-from cosim.toolchain.processes import Progress
+from cosim.toolchain.processes import Progress, threads
 from cosim.waveforms.result import Result
 
 COARSER = 3.5
@@ -75,27 +73,6 @@ MOST_PERIODS = 8
 """Most periods of the drive after which motion is recognised to repeat."""
 
 
-class _Stopped(CosimError):
-    """Raised in runs whose result is no longer wanted."""
-
-
-@contextmanager
-def _beside(count: int) -> Iterator[tuple[ThreadPoolExecutor, Progress]]:
-    """Threads for ``count`` runs, and their progress, which ends them if the block raises."""
-    stopped = Event()
-
-    def going(_: float) -> None:
-        if stopped.is_set():
-            raise _Stopped
-
-    with ThreadPoolExecutor(count) as threads:
-        try:
-            yield threads, going
-        except BaseException:
-            stopped.set()
-            raise
-
-
 def checked(scene: Scene, run: Callable[[], Result], strict: bool = False) -> Result:
     """The result of ``run``, which runs ``scene``, with two additions to its summary: the error of
     v_average, m/s, and the kind of motion.
@@ -105,7 +82,7 @@ def checked(scene: Scene, run: Callable[[], Result], strict: bool = False) -> Re
     raises.
     """
     load(3)
-    with _beside(2) as (threads, going):
+    with threads(2) as (pool, going):
 
         def mean(of: Scene | None) -> float | None:
             with suppress(CosimError):
@@ -117,8 +94,8 @@ def checked(scene: Scene, run: Callable[[], Result], strict: bool = False) -> Re
         if strict:
             asked = [_steps(scene, 1.0 / STRICT**k) for k in (1, 2)]
             asked += [_started(scene, ahead) for ahead in AHEAD]
-        others = [threads.submit(mean, each) for each in asked]
-        kind = threads.submit(motion, scene, going)
+        others = [pool.submit(mean, each) for each in asked]
+        kind = pool.submit(motion, scene, going)
         result = run()
         own, told = result.summary["v_average"], [other.result() for other in others]
         found: dict[str, Any] = kind.result()
@@ -140,8 +117,8 @@ def checked_ports(scene: Scene, run: Callable[[], Result]) -> Result:
     scene does not allow such long ones. No error where that run fails. Raises what ``run`` raises.
     """
     told: dict[str, Any] = {}
-    with _beside(1) as (threads, going):
-        other = threads.submit(one_run, few_rows(_longer(scene, COARSER)), going, alone=True)
+    with threads(1) as (pool, going):
+        other = pool.submit(one_run, few_rows(_longer(scene, COARSER)), going, alone=True)
         result = run()
         with suppress(CosimError):
             told = other.result().summary
