@@ -5,7 +5,8 @@ The drive is a PWL source within the netlist, so that the machine needs no other
 
 import tempfile
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
+from math import nextafter
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from cosim.circuit.netlist import prepare
 from cosim.drive.command import command
-from cosim.drive.pieces import LEVEL, SINE, Command, Piece
+from cosim.drive.pieces import LEVEL, SINE, Piece
 from cosim.errors import BadInput
 from cosim.files.atomic import whole
 from cosim.fmus.netlist import write
@@ -27,8 +28,6 @@ _FALL = 1e-9
 
 _PARTS = 400
 """Straight lines per period of a sine."""
-
-_AT_A_TIME = 512  # pieces of the drive
 
 _MOST = 200_000
 """Most points of a source; ngspice searches them at each step."""
@@ -83,10 +82,12 @@ def _deck(scene: Scene) -> str:
 
 def _points(scene: Scene, column: str) -> list[tuple[float, float]]:
     """Times and values of a source: before time 0 the command is 0, and both pins are at rest."""
-    drive = command(scene)
+    drive, end = command(scene), scene.run.duration
     found = [(0.0, 0.0 if column == "v1" else drive.v_offset)]
-    for begin, until, values in _lines(drive, scene.run.duration, column):
-        t = np.linspace(begin, until, len(values))
+    for piece in drive.pieces(0.0, nextafter(end, 0.0), _MOST):  # none that begins at the end
+        until = min(piece.until, end)
+        values = _values(piece, until, column)
+        t = np.linspace(piece.begin, until, len(values))
         same = abs(values[0] - found[-1][1]) <= 1e-12
         if not same:
             t[0] += _FALL
@@ -99,17 +100,8 @@ def _points(scene: Scene, column: str) -> list[tuple[float, float]]:
     return found
 
 
-def _lines(drive: Command, end: float, column: str) -> Iterator[tuple[float, float, list[float]]]:
-    """Begin, end, and values at equal distances, of each piece of the drive."""
-    begin = 0.0
-    while begin < end:
-        for piece in drive.pieces(begin, end, _AT_A_TIME):
-            until = min(piece.until, end)
-            yield piece.begin, until, _values(piece, until, column)
-            begin = until
-
-
 def _values(piece: Piece, until: float, column: str) -> list[float]:
+    """A source's values at equal distances in a piece of the drive."""
     if column == "pin":
         return [piece.pin] * 2
     if column == "dac" and piece.kind == LEVEL:

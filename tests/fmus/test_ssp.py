@@ -97,6 +97,7 @@ def test_the_pins_make_the_command(tmp_path: Path, waveform: str) -> None:
     for name in ("vdac", "voffset"):
         words = re.findall(rf"^{name} .*pwl\(([^)]*)\)", deck, re.MULTILINE | re.IGNORECASE)[0]
         times[name], volts[name] = np.array(words.split(), float).reshape(-1, 2).T
+        assert np.all(np.diff(times[name]) > 0.0)  # up to the end of the run, where it jumps
     command = cosim.load("reference", {**settings, "run.duration": 1.0})
     at = np.sort(np.random.default_rng(0).uniform(0.0, 0.2, 997))  # on no jump
     pins = [np.interp(at, times[name], volts[name]) for name in ("voffset", "vdac")]
