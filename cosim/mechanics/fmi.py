@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from copy import copy
 from ctypes import byref, c_double, c_uint, c_void_p, cast
-from functools import cache, cached_property
+from functools import cache, cached_property, partialmethod
 from itertools import count
 from threading import Lock
 from typing import Any
@@ -138,17 +138,10 @@ class Interface:
         """Advance by ``step`` from ``time``, s."""
         self._call("do_step", time, step, *_STEP_ENDS[self.version])
 
-    def set_reals(self, places: Any, values: Any) -> None:
-        self._exchange("set_reals", places, values)
-
-    def get_reals(self, places: Any, values: Any) -> None:
-        self._exchange("get_reals", places, values)
-
-    def set_integers(self, places: Any, values: Any) -> None:
-        self._exchange("set_integers", places, values)
-
-    def get_integers(self, places: Any, values: Any) -> None:
-        self._exchange("get_integers", places, values)
+    set_reals = partialmethod(_exchange, "set_reals")
+    get_reals = partialmethod(_exchange, "get_reals")
+    set_integers = partialmethod(_exchange, "set_integers")
+    get_integers = partialmethod(_exchange, "get_integers")
 
     def get_state(self, handle: c_void_p) -> None:
         """Save the state into ``handle``: a null one is given memory, a used one is overwritten."""
