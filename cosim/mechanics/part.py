@@ -9,7 +9,7 @@ behind it may rub with µ_p F_n against the part's own velocity, set-valued at r
 m/s, m/s².
 
 `exact` goes from event to event in closed form. `threshold` and `moreau` take fixed time steps, for
-comparison; `published` is `threshold` as in the simulation of Yako, Nowak, Yuan and Salisbury.
+comparison; the former is by default the simulation of Yako, Nowak, Yuan and Salisbury.
 """
 
 import sys
@@ -143,8 +143,8 @@ def threshold(
     time: Real,
     v_surface: Real,
     *,
-    step: float,
-    v_min: float,
+    step: float = PUBLISHED_STEP,
+    v_min: float = PUBLISHED_V_MIN,
     output: Real | None = None,
     **given: Unpack[Case],
 ) -> PartMotion:
@@ -153,24 +153,14 @@ def threshold(
     The part counts as sticking while it differs from the surface by less than ``v_min`` [m/s], and
     the surface's acceleration is the difference quotient of its velocity since the last step.
     Without ``output`` the times are the steps', with it heights and velocities are interpolated
-    linearly between them.
+    linearly between them. By default it is the scheme of Yako and others, 0.1 ms and 10 µm/s: their
+    Simulink model has the solver ode3, no zero crossings, and the tracked velocity interpolated and
+    differentiated by a Derivative block.
     """
     case = _Case(time, v_surface, **given)
     if not v_min >= 0:
         raise BadInput(f"The velocity threshold must not be negative, and is {v_min:g} m/s.")
     return case.stepped(library("part").part_threshold, (step, v_min), output)
-
-
-def published(
-    time: Real, v_surface: Real, *, output: Real | None = None, **given: Unpack[Case]
-) -> PartMotion:
-    """The authors' scheme: `threshold` with a step of 0.1 ms and 10 µm/s.
-
-    It stands for their Simulink model: solver ode3, no zero crossings, the tracked velocity
-    interpolated and differentiated by a Derivative block.
-    """
-    step, v_min = PUBLISHED_STEP, PUBLISHED_V_MIN
-    return threshold(time, v_surface, step=step, v_min=v_min, output=output, **given)
 
 
 def moreau(

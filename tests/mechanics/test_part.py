@@ -12,7 +12,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from cosim.errors import BadInput
-from cosim.mechanics.part import exact, moreau, published, threshold
+from cosim.mechanics.part import exact, moreau, threshold
 from tests.helpers import rational_part
 from tests.helpers.examples import examples
 
@@ -353,10 +353,10 @@ def test_a_threshold_sticks_only_if_a_step_changes_less_than_it():
     assert sine(1e-4, threshold, v_min=1e-5) > 1e-4
 
 
-def test_published_is_the_threshold_scheme_with_the_authors_numbers():
+def test_the_threshold_scheme_is_by_default_that_of_the_authors():
     time = np.linspace(0, 0.1, 31)
     v = 0.3 * np.sin(130 * time)
-    one = published(time, v, **FRICTION)
+    one = threshold(time, v, **FRICTION)
     other = threshold(time, v, step=1e-4, v_min=1e-5, **FRICTION)
     assert (one.z == other.z).all()
     assert len(one.time) == 1001

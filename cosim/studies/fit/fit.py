@@ -230,7 +230,7 @@ def _evaluated(trials: list[Trial], known: Sequence[Force], solver: Solver) -> T
         used = slice(FIRST_ROW, len(trial.time) - LAST_ROWS)
         time = np.ascontiguousarray(trial.time[used] - trial.time[FIRST_ROW])
         steps = int(np.floor(time[-1] / part.PUBLISHED_STEP + 1e-6))
-        motion = (part.exact if solver == "exact" else part.published)(
+        motion = (part.exact if solver == "exact" else part.threshold)(
             time,
             np.ascontiguousarray(trial.platform.v[used]),
             mu_s=published.MU_S,
