@@ -137,15 +137,13 @@ class Evaluator:
         with self._pool() as pool:
             for task, found in each(pool, call, self._tasks(points)):
                 if isinstance(found, Exception):
-                    found = [self._given_up(found)] * len(task)
+                    lost = failed(found)
+                    if self._dask is not None:
+                        # Its workers died again and again, or raised what no scene explains.
+                        words = f"The cluster gave it up: {lost.failure}"
+                        lost = Outcome({}, words, machine=True)
+                    found = [lost] * len(task)
                 yield from zip((key for key, _ in task), found, strict=True)
-
-    def _given_up(self, error: Exception) -> Outcome:
-        outcome = failed(error)
-        if self._dask is None:
-            return outcome
-        # The task's workers died again and again, or raised what no scene explains.
-        return Outcome({}, f"The cluster gave it up: {outcome.failure}", machine=True)
 
     def _pool(self) -> AbstractContextManager[Pool]:
         """New threads for one call of ``run``, or the cluster, which stays connected."""

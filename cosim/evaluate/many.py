@@ -43,7 +43,18 @@ def threads(common: Any, count: int) -> Iterator[Pool]:
 def cluster(common: Any, address: str) -> Iterator[Pool]:
     """The cluster at ``address``, whose workers must have this version of cosim. Raises BadInput
     where there is no such cluster."""
-    with closing(_client(address)) as client:
+    try:
+        from distributed import Client
+
+        connected: Any = Client(address, timeout=PATIENCE)
+    except ImportError as error:
+        raise BadInput(
+            "--dask needs the package distributed: install cosim with its extra dask."
+        ) from error
+    except (OSError, ValueError) as error:
+        reason = " ".join(str(error).split())
+        raise BadInput(f"--dask {address}: no cluster answers there ({reason}).") from error
+    with closing(connected) as client:
         count = sum(client.nthreads().values())
         if not count:
             raise BadInput(f"--dask {address}: this cluster has no workers.")
@@ -75,17 +86,3 @@ def each(
         except Exception as error:
             found = error
         yield item, found
-
-
-def _client(address: str) -> Any:
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise BadInput(
-            "--dask needs the package distributed: install cosim with its extra dask."
-        ) from error
-    try:
-        return Client(address, timeout=PATIENCE)
-    except (OSError, ValueError) as error:
-        reason = " ".join(str(error).split())
-        raise BadInput(f"--dask {address}: no cluster answers there ({reason}).") from error

@@ -12,7 +12,7 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cosim.files.atomic import whole
+from cosim.files.atomic import whole, write_text
 from cosim.toolchain.versions import versions
 
 if TYPE_CHECKING:
@@ -107,8 +107,7 @@ def write_page(
     for heading, rows in tables.items():
         lines += [f"## {heading}", "", *markdown(rows), ""]
     lines += [", ".join(f"{k} {v}" for k, v in machine().items()) + "."]
-    with whole(path) as temporary:
-        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_text(path, "\n".join(lines) + "\n")
 
 
 def markdown(rows: Sequence[Row]) -> list[str]:
