@@ -4,8 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from cosim.errors import BadInput, plain
-from cosim.scene import Key, Scene, changed
-from cosim.scene.describe import KEYS
+from cosim.scene import KEYS, Key, Scene, changed
 from cosim.scene.loading import parted
 from cosim.scene.messages import ended, suggestion
 from cosim.scene.tables import KNOBS, LEVEL_KEY, PARAM_KEY, said_twice

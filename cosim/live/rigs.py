@@ -7,8 +7,7 @@ from typing import Any
 from cosim.circuit.heat import rise
 from cosim.files.link import LONGEST
 from cosim.mechanics.stickslip import parameters
-from cosim.scene import Key, Scene, firmware, list_scenes, load
-from cosim.scene.describe import KEYS
+from cosim.scene import KEYS, Key, Scene, firmware, list_scenes, load
 from cosim.scene.tables import COMMANDS, KNOBS
 
 _MACHINE = Path(__file__).with_name("web") / "machine.json"

@@ -27,8 +27,7 @@ from cosim.arrays import Array
 from cosim.errors import BadInput, CosimError
 from cosim.mechanics.fmi import load
 from cosim.mechanics.normal_force import normal_force
-from cosim.scene import Scene, changed
-from cosim.scene.describe import KEYS
+from cosim.scene import KEYS, Scene, changed
 from cosim.simulation.elsewhere import one_run
 from cosim.simulation.fidelity import LEAST, Fidelity, relative_error
 from cosim.simulation.here import few_rows, simulate_here

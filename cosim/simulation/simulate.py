@@ -9,8 +9,7 @@ from functools import partial
 from typing import Any, Literal
 
 from cosim.errors import BadInput, BeyondModel
-from cosim.scene import Scene, changed, load
-from cosim.scene.loading import Overrides
+from cosim.scene import Overrides, Scene, changed, load
 from cosim.simulation.elsewhere import one_run
 from cosim.toolchain.processes import Progress
 from cosim.waveforms.result import Result

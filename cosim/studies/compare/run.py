@@ -11,8 +11,7 @@ from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.files.atomic import write_json
 from cosim.files.picture import Picture
-from cosim.scene import Scene, load
-from cosim.scene.loading import Overrides
+from cosim.scene import Overrides, Scene, load
 from cosim.simulation.rungs.given_surface import surface
 from cosim.simulation.simulate import simulate
 from cosim.studies.compare import figure

@@ -10,8 +10,7 @@ from cosim.errors import BadInput
 from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.point import inputs
 from cosim.evaluate.store import Store, reported
-from cosim.scene import Scene, load
-from cosim.scene.loading import Overrides
+from cosim.scene import Overrides, Scene, load
 from cosim.studies.limits import figures
 from cosim.studies.limits.answer import BY_NAME, ends, gains, noise, percent, sentences
 from cosim.studies.limits.changes import AS_IT_IS, CHANGES, Settings

@@ -21,9 +21,6 @@ SETTLE, SPAN = 0.6, 0.6
 OPA548_CURRENT = 5.0
 """A: the OPA548's peak current (data sheet SBOS070D)."""
 
-Numbers = Mapping[str, float]
-"""Of a run's summary, SI."""
-
 
 @dataclass(frozen=True)
 class Goal:
@@ -35,7 +32,8 @@ class Goal:
     """Unit in tables and figures."""
     scale: float
     """Factor from SI to this unit."""
-    of: Callable[[Numbers], float]
+    of: Callable[[Mapping[str, float]], float]
+    """The number from those of the summary, SI."""
 
 
 GOALS = (

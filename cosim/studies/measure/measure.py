@@ -13,8 +13,7 @@ from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.point import inputs
 from cosim.evaluate.store import Store, reported
 from cosim.files.picture import Picture
-from cosim.scene import Scene, load
-from cosim.scene.loading import Overrides
+from cosim.scene import Overrides, Scene, load
 from cosim.studies.limits.study import checked, ensemble
 from cosim.studies.measure.sample import (
     CANDIDATES,

@@ -13,8 +13,7 @@ from cosim.errors import BadInput, SimulationFailed
 from cosim.evaluate.point import in_whole_periods
 from cosim.evaluate.store import Store, hashed, reported
 from cosim.files.picture import Picture
-from cosim.scene import Scene, changed, load
-from cosim.scene.loading import Overrides
+from cosim.scene import Overrides, Scene, changed, load
 from cosim.simulation.fidelity import relative_error
 from cosim.simulation.simulate import simulate
 from cosim.studies.plots import GREEN, panels

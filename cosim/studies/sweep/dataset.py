@@ -16,8 +16,7 @@ from cosim.evaluate.point import Outcome
 from cosim.files.atomic import together
 from cosim.mechanics import fmi
 from cosim.mechanics.package import unpacked
-from cosim.scene import Scene, firmware, to_toml
-from cosim.scene.describe import KEYS
+from cosim.scene import KEYS, Scene, firmware, to_toml
 from cosim.scene.tables import MACHINE
 from cosim.studies.sweep.design import Design
 from cosim.waveforms.columns import netcdf_name, netcdf_names

@@ -19,8 +19,7 @@ from cosim.evaluate.many import each, threads
 from cosim.evaluate.point import Number, Settings, in_whole_periods
 from cosim.files.atomic import whole
 from cosim.mechanics import package as fmu
-from cosim.scene import Scene, changed, load
-from cosim.scene.loading import Overrides
+from cosim.scene import Overrides, Scene, changed, load
 from cosim.simulation.checks import motion
 from cosim.studies.sweep import dataset
 from cosim.studies.sweep.design import Design, grid, sample

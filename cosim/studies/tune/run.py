@@ -17,8 +17,7 @@ from cosim.errors import BadInput, Note, SimulationFailed, plain
 from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.keys import FREQUENCIES, numeric_key, refuse_unknown
 from cosim.evaluate.point import Number, Outcome, Settings, in_whole_periods
-from cosim.scene import Scene, changed, load
-from cosim.scene.loading import Overrides
+from cosim.scene import Overrides, Scene, changed, load
 from cosim.scene.messages import bad, suggestion
 from cosim.scene.tables import COMMANDS, MOST_CORNERS
 from cosim.search.known import Feasible, Known

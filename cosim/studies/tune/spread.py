@@ -8,9 +8,7 @@ from typing import Any
 
 from cosim.errors import BadInput, SimulationFailed
 from cosim.evaluate.evaluator import Evaluator
-from cosim.scene import Scene, load
-from cosim.scene.describe import KEYS
-from cosim.scene.loading import Overrides
+from cosim.scene import KEYS, Overrides, Scene, load
 from cosim.scene.tables import KNOBS
 from cosim.search.turns import TURN
 from cosim.simulation.fidelity import Fidelity
