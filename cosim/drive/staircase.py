@@ -48,10 +48,8 @@ class Staircase(Command):
     def _until(self, period: int, step: int) -> float:
         if not self._edges:
             return inf
-        place = bisect_right(self._edges, step)
-        if place == len(self._edges):
-            period, place = period + 1, 0
-        return (period * len(self.codes) + self._edges[place]) / self._rate
+        after, place = divmod(bisect_right(self._edges, step), len(self._edges))
+        return ((period + after) * len(self.codes) + self._edges[place]) / self._rate
 
 
 class WithPwm(Command):

@@ -252,8 +252,7 @@ class _Case:
     def stepped(
         self, solve: Callable[..., int], own: tuple[float, ...], output: Real | None
     ) -> PartMotion:
-        """The motion by a compiled routine with fixed steps and its ``own`` arguments, of which the
-        first is the step (s)."""
+        """The motion by a compiled routine and its ``own`` arguments, first the fixed step (s)."""
         step, span = own[0], self.end - self.time[0]
         if not step > 0 or span / step > MOST_STEPS:
             raise BadInput(f"The step must be positive, and no less than {span / MOST_STEPS:g} s.")

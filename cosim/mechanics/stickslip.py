@@ -183,8 +183,7 @@ class Mechanics:
         give_back(self.instance)
 
     def failed(self, error: Exception, time: float) -> SimulationFailed:
-        """The failure to raise for a call of the FMU at ``time`` (s) that gave ``error``, in the
-        FMU's words."""
+        """What to raise for a call at ``time`` (s) that gave ``error``, in the FMU's words."""
         said = self.instance.messages[-1] if self.instance.messages else str(error)
         current, beyond, _ = said.partition(": current = ")[2].partition(" is outside")
         if beyond:  # the FMU refuses the current, to which circuit or coupling steps drove it

@@ -279,8 +279,7 @@ class Scene(BaseModel):
         )
 
     def _need(self, why: str, *needed: tuple[str, Sequence[object], str]) -> None:
-        """Raise where a key's value is not allowed; ``needed`` are keys, their allowed values, and
-        these in words."""
+        """Raise where a value is not allowed; ``needed``: keys, allowed values, these in words."""
         for full, allowed, words in needed:
             table, _, key = full.partition(".")
             value = getattr(getattr(self, table), key)

@@ -30,14 +30,13 @@ class Search(Protocol):
         ...
 
     def tell(self, points: Array, scores: Array, feasible: Feasible) -> None:
-        """Take the scores of points (rows), whether asked for or not; -inf for no score."""
+        """Take the scores of points (rows), whether asked for or not; -inf where infeasible."""
         ...
 
 
 def apart(points: Array, distance: float, count: int) -> list[int]:
-    """Row numbers of points chosen in order: the first one, then each whose distance (largest
-    difference of a coordinate) from all chosen ones is at least ``distance``; at most ``count``, or
-    without limit for -1."""
+    """Row numbers of points chosen in order: each whose distance (largest difference of a
+    coordinate) from all chosen before is at least ``distance``; at most ``count``, -1: all."""
     kept: list[int] = []
     left = np.ones(len(points), bool)  # those that are far enough from all that are kept
     while left.any() and len(kept) != count:

@@ -8,7 +8,6 @@ ridges oblique to the keys, which the covariance of CMA-ES learns.
 N. Hansen, "The CMA Evolution Strategy: A Tutorial", arXiv:1604.00772 (2016), by the package cmaes.
 """
 
-from math import inf
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -93,7 +92,6 @@ class Climb:
     def tell(self, points: Array, scores: Array, feasible: Feasible) -> None:
         """Take the scores of points (rows), whether asked for or not; those of a generation that
         was asked for also update CMA-ES."""
-        scores = np.where(feasible, scores, -inf)
         self._points = np.vstack([self._points, points])
         self._scores = np.concatenate([self._scores, scores])
         if self._climb and np.array_equal(points, self._asked[:, : self._keys]):

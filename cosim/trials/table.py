@@ -265,8 +265,7 @@ def _factor(where: str, unit: str, kind: str) -> float:
 
 
 def _tracker_names(path: str, line: int, tracks: list[str], head: list[str]) -> list[str]:
-    """Names as in the trials, from the line of track names and the line t x y t x y …; "" for a
-    column that is not used."""
+    """Names as in the trials, from the lines of tracks and of t x y t x …; "" for one not used."""
     track, found = "", []
     for cell, quantity in zip_longest(tracks[: len(head)], map(_bare, head), fillvalue=""):
         track = cell or track  # a track's name stands above its first column only

@@ -46,8 +46,7 @@ def about(name: str, unit: str) -> dict[str, str]:
 
 
 def netcdf_name(name: str) -> str:
-    """The nearest name that netCDF allows: no slash, no space at its end, and a letter, digit or _
-    first."""
+    """The nearest name for netCDF: no slash, no space at the end; first a letter, digit or _."""
     return ("" if name[:1].isalnum() else "_") + name.replace("/", "|").rstrip(" ")
 
 

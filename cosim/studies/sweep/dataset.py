@@ -35,8 +35,7 @@ POINT = "point"
 
 
 class Numbers:
-    """The summaries of ``count`` points, an array over the points for each name of a number, and
-    why some points failed."""
+    """The summaries of ``count`` points, an array for each number's name, and why some failed."""
 
     def __init__(self, count: int) -> None:
         self._count = count
