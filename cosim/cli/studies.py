@@ -11,21 +11,17 @@ from cosim.cli.command import Command, print_page, progress_bar, writable
 from cosim.errors import BadInput
 from cosim.studies.study import Study, Told, loaded, studies
 
-CHART = "chart"
-"""The group of commands that write a table, a page and figures into one folder."""
-
 
 def commands() -> list[Command]:
     """A command for each study that declares one."""
-    found = [(study.command.split(), study) for study in studies() if study.command]
-    alone = [_command(words[0], study) for words, study in found if len(words) == 1]
-    charts = [_command(words[1], study) for words, study in found if words[0] == CHART]
-    charts.sort(key=lambda command: command.name)
-    return [*alone, Command(CHART, "the studies, as tables and a figure", commands=charts)]
-
-
-def _command(name: str, study: Study) -> Command:
-    return Command(name, study.help, partial(_run, study), study.options, study.out)
+    alone: list[Command] = []
+    charts: list[Command] = []
+    for study in studies():
+        if study.command:
+            *group, name = study.command.split()
+            made = Command(name, study.help, partial(_run, study), study.options, study.out)
+            (charts if group else alone).append(made)
+    return [*alone, Command("chart", "the studies, as tables and a figure", commands=charts)]
 
 
 def _run(study: Study, out: Path | None = None, **asked: Any) -> None:

@@ -104,9 +104,8 @@ def choose(scene: Scene, run: Callable[[Scene], Result]) -> Choice:
     errors["ideal"] = relative_error(ideal, own) + errors["limited"]
     for model in ("ideal", "limited"):
         if errors[model] <= tolerance:
-            return Choice(
-                model, f"at most about {percent(errors[model])} off the amplifier", errors
-            )
+            why = f"at most about {percent(errors[model])} off the amplifier"
+            return Choice(model, why, errors)
     why = f"limited may be {percent(errors['limited'])} off, ideal {percent(errors['ideal'])}"
     return Choice(JUDGES, why, errors)
 

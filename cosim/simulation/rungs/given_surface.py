@@ -40,8 +40,7 @@ def surface(scene: Scene) -> Surface:
     periods = max(1, math.ceil(scene.run.duration * drive.frequency - 1e-9))
     if drive.waveform == "sine":
         law = (friction.mu_s, force_per_mass(scene), scene.mechanics.gravity, friction.mu_plate)
-        bounds = part.bounds(*law)
-        return Surface.sine(drive.velocity_amplitude, drive.frequency, periods, bounds)
+        return Surface.sine(drive.velocity_amplitude, drive.frequency, periods, part.bounds(*law))
     return Surface(*_cycle(scene), periods)
 
 
