@@ -418,14 +418,10 @@ def toml_value(value: bool | float | int | str | list[Any] | dict[str, Any]) -> 
     if isinstance(value, dict):
         pairs = (f"{toml_value(key)} = {toml_value(each)}" for key, each in value.items())
         return f"{{ {', '.join(pairs)} }}"
-    if isinstance(value, list):
-        return f"[{', '.join(map(toml_value, value))}]"
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        # JSON's escapes are TOML's, but for DEL
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return repr(value)
+    if isinstance(value, float):  # perhaps inf or nan, for messages
+        return repr(value)
+    # JSON's lists, words and whole numbers are TOML's, but for DEL.
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def schema() -> dict[str, Any]:
