@@ -259,6 +259,21 @@ def test_a_ram_lifted_for_an_instant_is_at_rest():
         assert bench.get("wall_contact", "q") == [1, 1e-4]
 
 
+@pytest.mark.parametrize("hold", [0.0, 1.0])
+def test_a_wall_does_not_pull_where_it_would_press_again_at_the_end_of_a_step(hold: float):
+    # q = travel − (J t²/2 − s t³/6) (1/m_r + 1/m_s) after the force has jumped to −J + s t
+    jump, ramp, h, heavy = 0.1, 150.0, 1e-3, 1e3
+    rig = {**FREE_BODIES, **TIGHT, "contact": RIGID, "travel": 1e-4, "surface_mass": heavy}
+    with Bench(**rig, normal_force=0.0, current=0.1) as bench:
+        bench.run_to(0.05)
+        assert bench["wall_contact"] == 1
+        bench.step(h, current=-jump, current_slope=ramp, inputs_hold_for=hold)
+        assert bench["wall_contact"] == 0
+        gone = (jump * h**2 / 2 - ramp * h**3 / 6) * (1 / RAM + 1 / heavy)
+        near(bench["q"], 1e-4 - gone, 1e-10, 1e-4)
+        near(bench["q_rate"], (ramp * h**2 / 2 - jump * h) * (1 / RAM + 1 / heavy), 1e-10)
+
+
 def test_elastic_walls_keep_the_energy():
     rig = {"gravity": 0.0, "flexure_damping": 0.0, "suspension_damping": 0.0, "restitution": 1.0}
     with Bench(**rig, **TIGHT, contact=RIGID, normal_force=0.0, current=0.3) as bench:

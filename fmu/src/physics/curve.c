@@ -95,6 +95,17 @@ static double locate(const Model *m, const Curve *curve, int index, int use_rate
     return h;
 }
 
+/* Has a jump made the wall of a ram at rest pull? It may press again by the step's end; not where the
+ * ram would be back before it has left by more than rounding. */
+static int pulls(const Model *m, const EventFunction *f)
+{
+    if (f->kind != EVENT_WALL_LEFT || m->mode[f->surface].wall != WALL_REST || f->value >= -f->noise)
+        return 0;
+    const double mass = m->r.ram_mass + m->r.surface_mass + m->r.part_mass;
+    const double time = f->rate > 0.0 ? -f->value / f->rate : INFINITY;
+    return -f->value * time * time > 1e-15 * m->r.travel * mass;
+}
+
 /* The first event between two points of the curve. */
 static double first_between(const Model *m, const Curve *curve, const Point *from, const Point *to,
                             int *which)
@@ -106,6 +117,10 @@ static double first_between(const Model *m, const Curve *curve, const Point *fro
     for (int i = 0; i < from->n; i++) {
         const EventFunction a = seen(m, curve, from, i), b = seen(m, curve, stop, i);
         double high = -1.0;
+        if (pulls(m, &from->functions[i])) {
+            *which = i;
+            return begin;
+        }
         if (b.value < -b.noise) {
             high = h;
         } else if (a.rate < 0.0 && b.rate > 0.0 && a.value > 0.0 &&
