@@ -97,3 +97,26 @@ def test_a_rig_of_two_surfaces_has_a_point_apart():
     assert tie == pytest.approx(v_average({}), rel=1e-6)
     assert near == pytest.approx(late(1e-5), rel=1e-6)
     assert abs(near / tie - 1.0) > 1e-3
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_forces_that_all_grow_from_zero_break_the_plates_hold_alone(way: int):
+    # At first no friction bears anything, and both limits are passed at once: F = c t against
+    # mu_s F_n = mu_s s t. With the plate slipping surface and part go on together, a part that
+    # would slip too being too slow (mu_k = mu_s): m (c − mu_p s)/(m + m_s) + mu_p s < mu_s s.
+    force, normal, mu_plate, end = 1.5, 1.0, 0.2, 0.01  # N/s, N/s, 1, s
+    assert PART * (force - mu_plate * normal) / (PART + SURFACE) < (MU_S - mu_plate) * normal
+    rig = {**FREE_BODIES, "travel": 1.0, "mu_s": MU_S, "mu_k": MU_S, "mu_plate": mu_plate}
+    with Bench(**rig, normal_force=0.0, tolerance=1e-13) as bench:
+        bench.run_to(end, normal_force_slope=normal, current_slope=-way * force)
+        expected = way * (force - mu_plate * normal) * end**2 / 2 / (PART + SURFACE)
+        assert bench.get("v_part", "v_surface") == pytest.approx([expected] * 2, rel=1e-6)
+        assert bench["sticking"] == 1
+
+
+def test_a_normal_force_that_grows_from_zero_finds_all_at_rest():
+    # Magnets press both rams on their upper walls; rounding of that does not move the part.
+    rig = {"gravity": 0.0, "suspension": 3, "independent": 1, "n_surfaces": 2}
+    with Bench(**rig, normal_force=0.0) as bench:
+        bench.run_to(0.05, normal_force_slope=10.0)
+        assert bench.get("sticking", "sticking_2", "stick_slip_events") == [1, 1, 0]

@@ -33,10 +33,10 @@ static int sign(double x)
     return (x > 0.0) - (x < 0.0);
 }
 
-/* What rounding makes of a friction force, N. */
+/* What rounding makes of a friction force, N: where a part needs none, what those on the ram leave. */
 static double force_noise(const Forces *f)
 {
-    return 1e-13 * (fabs(f->friction) + f->normal);
+    return 1e-13 * (fabs(f->friction) + f->normal + fabs(f->drive) + fabs(f->wall));
 }
 
 static int functions_of(const Model *m, const double all[N_ALL], int s, double tau,
@@ -420,7 +420,7 @@ void stickslip_apply_event(Model *m, int s, double tau, EventKind kind)
             stop_surface(m, s);
         if (m->n.independent)
             end_slip_of_both(m, 1 - s);
-        keep = 0;
+        keep = choose(m, s, tau, 0, second_mode(m, s), KEPT);
         break;
     case EVENT_SLIP_DOWN:
         break_slip(m, s, tau, -1);
