@@ -458,6 +458,11 @@ class Mechanics(Table):
                 f"1.1 times mechanics.travel = {self.travel:g} m with "
                 'mechanics.suspension = "repulsion"'
             )
+        if not self.free_ram and self.contact == "rigid" and abs(self.initial_lift) > self.travel:
+            raise fault(
+                f"mechanics.initial_lift = {self.initial_lift:g} m must lie within "
+                f"mechanics.travel = {self.travel:g} m with a rigid wall in direct drive"
+            )
 
 
 _LAWS = {

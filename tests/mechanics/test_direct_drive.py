@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
 from scipy.linalg import expm
 
 from cosim.scene import load
@@ -123,3 +124,17 @@ def test_the_energy_account_closes(contact: int, mu_plate: float):
         assert gains == pytest.approx(sum(bench.get(*names)), rel=1e-9)
         assert bench["q"] == pytest.approx(bench["z_ram"] - bench["z_surface"], abs=1e-12)
         assert bench["q_rate"] == pytest.approx(-bench["v_surface"], abs=1e-10)
+
+
+@pytest.mark.parametrize("lift", [1e-3, -1e-3])
+def test_a_surface_may_begin_within_a_compliant_wall_and_not_beyond_a_rigid_one(lift: float):
+    rig = {"initial_lift": lift, "travel": 9e-4, "mu_s": 0.0, "mu_k": 0.0}
+    names = ("energy_friction", "energy_impact", "energy_damping", "energy_stored")
+    with Bench(**rig, **TIGHT, contact=COMPLIANT) as bench:
+        assert bench["wall_contact"] == (-1 if lift > 0 else 1)
+        assert bench["q"] == -lift
+        bench.run_to(0.05, h=1e-3)
+        assert bench["energy_in"] == 0.0
+        assert sum(bench.get(*names)) == pytest.approx(0.0, abs=1e-12)
+    with pytest.raises(FMICallException):
+        Bench(**rig, **TIGHT, contact=RIGID)

@@ -193,6 +193,17 @@ static void hang_ram(Model *m)
     m->y[Q] = rest_between(m, low, high);
 }
 
+/* On the ground, which the lifted surface may press into a compliant wall. */
+static void stand_ram(Model *m)
+{
+    const double q = -m->r.initial_lift;
+    m->y[Q] = q;
+    if (fabs(q) > m->r.travel) {
+        m->mode[0].wall = WALL_TOUCH;
+        m->mode[0].side = q > 0.0 ? 1 : -1;
+    }
+}
+
 int stickslip_model_contradiction(const Model *m, char *message)
 {
     if (m->r.mu_k > m->r.mu_s) {
@@ -204,6 +215,13 @@ int stickslip_model_contradiction(const Model *m, char *message)
         snprintf(message, MODEL_MESSAGE_SIZE,
                  "suspension_distance = %g m must be at least 1.1 times travel = %g m",
                  m->r.suspension_distance, m->r.travel);
+        return -1;
+    }
+    if (m->n.ram_fixed && !m->n.prescribed && m->n.contact == 2 &&
+        fabs(m->r.initial_lift) > m->r.travel) {
+        snprintf(message, MODEL_MESSAGE_SIZE,
+                 "initial_lift = %g m lies beyond a rigid wall: travel = %g m", m->r.initial_lift,
+                 m->r.travel);
         return -1;
     }
     if (m->n.prescribed && m->n.source)
@@ -227,7 +245,7 @@ int stickslip_model_initialise(Model *m, char *message)
         if (!m->n.ram_fixed)
             hang_ram(m);
         else
-            m->y[Q] = -m->r.initial_lift; /* the ram stands on the ground */
+            stand_ram(m);
         m->y[Z] = stickslip_rest_height(m) + m->r.initial_lift;
     }
     m->mode[1] = m->mode[0];
