@@ -378,6 +378,35 @@ def test_directional_derivatives_are_the_differences(
     assert len({wall for _, wall in modes}) > 1
 
 
+@pytest.mark.parametrize(("normal", "slope"), [(0.05, 0.5), (0.25, 0.0)])
+def test_derivatives_of_a_part_at_rest_on_surface_and_plate(
+    version: int, normal: float, slope: float
+) -> None:
+    """The surface carries what it can of the weight, 0.5 F_n, and the plate the rest."""
+    weight = {"part_mass": 0.009, "gravity": 10.0}
+    with rig(version) as it:
+        friction = {"mu_s": 0.5, "mu_k": 0.5, "mu_plate": 2.0}
+        it.begin({**weight, **friction, "prescribed": 1, "normal_force": normal})
+        forces, surfaces = ["friction_force", "plate_force"], min(0.5 * normal, 0.09)
+        assert it.get(*forces) == pytest.approx([surfaces, 0.09 - surfaces])
+        found = it.derivative(forces, ["normal_force"], [1.0])
+        assert found == pytest.approx([slope, -slope], abs=1e-12)
+
+
+@pytest.mark.parametrize("hold", [0.0, 1.0])
+def test_a_normal_force_comes_to_zero_and_not_below(version: int, hold: float) -> None:
+    """Whether its steps are those of the integration or lie within one; 1000 of them sum up to 0
+    within rounding."""
+    with rig(version) as it:
+        it.begin({"mu_s": 0.0, "mu_k": 0.0, "normal_force": 0.3})
+        it.set(normal_force_slope=-30.0, inputs_hold_for=hold)
+        for _ in range(1000):
+            it.step(1e-5)
+        assert it.get("normal_force") == pytest.approx(0.0, abs=1e-9)
+        with pytest.raises(FMICallException):
+            it.step(1e-5)
+
+
 def test_the_derivative_of_the_time_to_an_impact(version: int) -> None:
     """Against small differences, where the ram flies towards a wall."""
     seen = 0

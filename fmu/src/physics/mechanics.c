@@ -43,13 +43,16 @@ void stickslip_forces_on_part(const Model *m, const Mode *mode, double tau, doub
 static void rates_on_part(const Model *m, const Mode *mode, const Forces *f, ForceRates *rate)
 {
     const double normal = f->normal > 0.0 ? m->r.normal_force_slope : 0.0;
+    const double weight = stickslip_part_mass_per_surface(m) * m->r.gravity;
     const int held = held_by_plate(m, mode);
 
     rate->wall = 0.0;
     rate->normal = normal;
     rate->plate = -m->r.mu_plate * normal * mode->plate;
     if (mode->slip == 0)
-        rate->friction = held ? 0.0 : -rate->plate;
+        rate->friction = !held                           ? -rate->plate
+                         : m->r.mu_s * f->normal < weight ? m->r.mu_s * normal
+                                                          : 0.0;
     else
         rate->friction = -m->r.mu_k * normal * mode->slip;
     if (held)

@@ -270,9 +270,18 @@ int stickslip_model_initialise(Model *m, char *message)
     return 0;
 }
 
-/* The inputs after h, with the normal force given. */
-static void move_inputs(Model *m, double h, double normal)
+/* N; so far below 0 the sum of many steps may end that lead to 0. */
+static const double NO_FORCE = 1e-9;
+
+static double normal_force_after(const Model *m, double h)
 {
+    return m->r.normal_force + m->r.normal_force_slope * h;
+}
+
+/* The inputs after h. */
+static void move_inputs(Model *m, double h)
+{
+    const double normal = normal_force_after(m, h);
     m->r.current += m->r.current_slope * h;
     m->r.command += m->r.command_slope * h;
     m->r.current_2 += m->r.current_2_slope * h;
@@ -291,9 +300,10 @@ static void reach_within(Model *m)
 
 int stickslip_model_step_within(Model *m, double h)
 {
-    if (!m->initialised || !(h > 0.0) || !stickslip_advance_within(m, h))
+    if (!m->initialised || !(h > 0.0) || normal_force_after(m, h) < -NO_FORCE ||
+        !stickslip_advance_within(m, h))
         return 0;
-    move_inputs(m, h, m->r.normal_force + m->r.normal_force_slope * h);
+    move_inputs(m, h);
     reach_within(m);
     return 1;
 }
@@ -306,12 +316,11 @@ int stickslip_model_step(Model *m, double h, char *message)
         return say(message, "the step must be a positive number of seconds");
     if (stickslip_model_contradiction(m, message)) /* of tunable parameters, set one by one */
         return -1;
-    const double normal = m->r.normal_force + m->r.normal_force_slope * h;
-    if (normal < -1e-12 * m->r.normal_force)
+    if (normal_force_after(m, h) < -NO_FORCE)
         return say(message, "normal_force falls below 0 N within the step; its slope is too steep");
     if (stickslip_advance(m, h, message))
         return -1;
-    move_inputs(m, h, normal);
+    move_inputs(m, h);
     if (m->ahead.active)
         reach_within(m);
     return 0;
@@ -445,7 +454,8 @@ void stickslip_model_energies(Model *m)
     }
 }
 
-double stickslip_model_derivative(const Model *m, size_t output, size_t input)
+/* By how much an output changes as an input, all others as they are, goes from one value to another. */
+static double difference(const Model *m, size_t output, size_t input, double from, double to)
 {
     Model a = *m;
     double *inputs[] = {&a.r.current, &a.r.current_2, &a.r.normal_force,
@@ -456,20 +466,14 @@ double stickslip_model_derivative(const Model *m, size_t output, size_t input)
                              offsetof(Reals, surface_acceleration) / sizeof(double)};
     Forces here, low, high, low_2 = {0}, high_2 = {0};
 
-    if (output == offsetof(Reals, coil_voltage) / sizeof(double) &&
-        input == offsetof(Reals, command_slope) / sizeof(double))
-        return stickslip_coil_voltage_per_slope(m, 0);
-    if (output == offsetof(Reals, coil_voltage_2) / sizeof(double) &&
-        input == offsetof(Reals, command_2_slope) / sizeof(double))
-        return m->n.independent ? stickslip_coil_voltage_per_slope(m, 1) : 0.0;
     for (int i = 0; i < 4; i++) {
         if (input != places[i])
             continue;
-        *inputs[i] = 0.0;
+        *inputs[i] = from;
         stickslip_forces(&a, a.mode, a.y, 0, 0.0, &low);
         if (m->n.independent)
             stickslip_forces(&a, a.mode, a.y, 1, 0.0, &low_2);
-        *inputs[i] = 1.0;
+        *inputs[i] = to;
         stickslip_forces(&a, a.mode, a.y, 0, 0.0, &high);
         if (m->n.independent)
             stickslip_forces(&a, a.mode, a.y, 1, 0.0, &high_2);
@@ -500,4 +504,24 @@ double stickslip_model_derivative(const Model *m, size_t output, size_t input)
         }
     }
     return 0.0;
+}
+
+double stickslip_model_derivative(const Model *m, size_t output, size_t input)
+{
+    if (output == offsetof(Reals, coil_voltage) / sizeof(double) &&
+        input == offsetof(Reals, command_slope) / sizeof(double))
+        return stickslip_coil_voltage_per_slope(m, 0);
+    if (output == offsetof(Reals, coil_voltage_2) / sizeof(double) &&
+        input == offsetof(Reals, command_2_slope) / sizeof(double))
+        return m->n.independent ? stickslip_coil_voltage_per_slope(m, 1) : 0.0;
+    /* Forces are affine in each input, but for those on a part at rest on surface and plate, which
+     * share its weight otherwise from a normal force on. */
+    const double carries = m->r.mu_plate > 0.0 && m->r.mu_s > 0.0
+                               ? stickslip_part_mass_per_surface(m) * m->r.gravity / m->r.mu_s
+                               : 0.0;
+    if (input != offsetof(Reals, normal_force) / sizeof(double) || carries == 0.0)
+        return difference(m, output, input, 0.0, 1.0);
+    return m->r.normal_force < carries
+               ? difference(m, output, input, 0.0, carries) / carries
+               : difference(m, output, input, carries, 2.0 * carries) / carries;
 }
