@@ -284,7 +284,7 @@ static void find_pulses(void)
         const double rise = v[3] > 0 ? v[3] : ports.model.step, fall = v[4] > 0 ? v[4] : ports.model.step;
         const double all[] = {0.0, rise, rise + v[5], rise + v[5] + fall};
         Pulse *p = &s.pulses[s.n_pulses];
-        *p = (Pulse){.delay = v[2], .period = v[6], .corner = -1, .previous = -INFINITY};
+        *p = (Pulse){.delay = v[2], .period = v[6], .corner = -1, .cycle = -1.0, .previous = -INFINITY};
         p->announced = -INFINITY;
         while (p->n < 4 && all[p->n] < p->period) {
             p->corners[p->n] = all[p->n];

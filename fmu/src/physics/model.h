@@ -68,7 +68,7 @@ void stickslip_model_coupling(Model *m);
 void stickslip_model_energies(Model *m);
 
 /* d(output)/d(current, current_2, normal_force or surface_acceleration) in the present mode,
- * analytically exact: forces are affine in all four; and d(coil_voltage)/d(command_slope), of either source. 0 for every other pair. */
+ * analytically exact: forces are affine in all four, or piece by piece; and d(coil_voltage)/d(command_slope), of either source. 0 for every other pair. */
 double stickslip_model_derivative(const Model *m, size_t output, size_t input);
 
 STICKSLIP_INTERNAL_END
