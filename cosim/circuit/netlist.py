@@ -28,6 +28,8 @@ from cosim.scene import Scene
 
 REQUIRED = ("i(vemf)", "v(out)", "v(sense)")
 """Vectors that every netlist has: the coils' total current, and the voltages of the coil's ends."""
+OWN = "own "
+"""Before a user's word in the log, as a netlist's own node may be called like the machine's."""
 OPTIONAL = ("v1", "swing", "climit", "slewing")
 """Nodes that are read where a netlist has them: the command at the power amplifier's input, and one
 for each limit, which acts while the node's magnitude is at least 0.5 V."""
@@ -76,10 +78,11 @@ def prepare(scene: Scene) -> tuple[str, dict[str, str]]:
     """
     path, words = path_of(scene), _words(scene)
     if scene.circuit.netlist is None:
-        (title, top), every, own = _packaged(path), [*dict.fromkeys(words.values())], None
+        (title, top), every, own = _packaged(path), [], None
     else:  # read anew each time, as the file may have changed
-        title, top, every, own = _checked(path, scene.renamed, tuple(words.values()))
-        words |= {each: each for each in every if each not in words}
+        asked = (*words.values(), *(scene.circuit.save or ()))
+        title, top, every, own = _checked(path, scene.renamed, asked)
+        words |= {f"{OWN}{each}": each for each in every}
     elements = top.elements
     external = _external_sources(elements, scene.renamed)
     present = {node for element in elements for node in element.nodes}
@@ -106,11 +109,9 @@ def prepare(scene: Scene) -> tuple[str, dict[str, str]]:
 
 
 def _words(scene: Scene) -> dict[str, str]:
-    """By the log's names: the words that a user's netlist has for the machine's current and ends,
-    and those to be saved besides."""
+    """The words that a user's netlist has for the machine's current and ends, by the log's."""
     ends = {"machine.current": "i(vemf)", "machine.out": "v(out)", "machine.sense": "v(sense)"}
-    named = {ends[end]: name for end, name in scene.renamed.items() if end in ends}
-    return named | {name: name for name in scene.circuit.save or ()}
+    return {ends[end]: name for end, name in scene.renamed.items() if end in ends}
 
 
 def _checked(

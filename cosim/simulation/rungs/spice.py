@@ -7,6 +7,7 @@ from itertools import chain
 import numpy as np
 
 from cosim.arrays import Array
+from cosim.circuit.netlist import AT_WORK, AT_WORK_HERE, OWN, asked_for
 from cosim.coupling.loop.recorder import Recorder
 from cosim.drive.command import command
 from cosim.drive.pieces import Command
@@ -21,7 +22,6 @@ def drive(scene: Scene, recorder: Recorder) -> Driven:
     """The coupling method of the scene joins ngspice and the mechanics."""
     # Imported here, since only runs of a circuit need PySpice, which takes a while to load.
     from cosim.circuit.false_cycles import refuse_false
-    from cosim.circuit.netlist import asked_for
     from cosim.circuit.outputs import measured
     from cosim.coupling.loop.lead import engine
     from cosim.coupling.loop.macro_steps import coupled
@@ -34,7 +34,8 @@ def drive(scene: Scene, recorder: Recorder) -> Driven:
     if scene.circuit.netlist is not None:
         _refuse_foreign_coil(scene, log)
         asks, notes = asked_for(scene)
-        values, without = measured(asks, log["time"], log)
+        known = {word.removeprefix(OWN): log[word] for word in log if word.startswith(OWN)}
+        values, without = measured(asks, log["time"], known)
         notes += [*without, *engine().remarks()]
         notes += _folded(scene, log, recorder.time)
     electric, waves = _electrics(scene, command(scene), log, recorder.time)
@@ -73,7 +74,7 @@ def _electrics(
     if circuit.netlist is None:
         copper += circuit.sense_resistance
     # Whether the circuit itself makes the command V1; else V1 is its input.
-    made = "v(v1)" in log and circuit.model != "amplifier"
+    made = "v(v1)" in log and circuit.model != "amplifier" and not scene.renamed
     delivered, squares, eddy = 0.0, 0.0, Eddy(scene)
     # A netlist's operating point may have a current.
     first = eddy.current = float(log["i(vemf)"][0] / coil.count)
@@ -94,7 +95,7 @@ def _electrics(
         settled = current[time >= settle]
         most, least = settled.max(initial=most), settled.min(initial=least)
         stop = len(rows) if time[-1] == end else int(np.searchsorted(rows, time[-1]))
-        known = [current, out - sense, *(part[name] for name in saved)]
+        known = [current, out - sense, *(part[OWN + name] for name in saved)]
         known += [part["v(v1)"]] if made else []
         for few in blocks(stop - done):
             at = rows[done:stop][few]
@@ -123,7 +124,8 @@ FOLDED = 0.2
 
 def _folded(scene: Scene, log: dict[str, Array], rows: Array) -> Iterator[str]:
     """A note on waveforms faster than their rows: a carrier at the rows' rate looks constant."""
-    names = {"coil_voltage": ("v(out)", "v(sense)")} | {v: (v,) for v in scene.circuit.save or []}
+    names = {"coil_voltage": ("v(out)", "v(sense)")}
+    names |= {word: (OWN + word,) for word in scene.circuit.save or []}
     missed, whole = np.zeros((2, len(names)))
     for part in _points({x: log[x] for x in {"time", *chain(*names.values())}}):
         time = part["time"]
@@ -147,7 +149,6 @@ def _folded(scene: Scene, log: dict[str, Array], rows: Array) -> Iterator[str]:
 def _limited(scene: Scene, log: dict[str, Array]) -> dict[str, float]:
     """The share of the time after settling in which each known limit acted."""
     from cosim.circuit.limits import shares_of_steps
-    from cosim.circuit.netlist import AT_WORK, AT_WORK_HERE
 
     least = AT_WORK_HERE if scene.circuit.netlist is None else AT_WORK
     spent: dict[str, float] = {}
