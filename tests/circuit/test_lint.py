@@ -237,6 +237,7 @@ def test_functions_are_those_of_ngspice(tmp_path, sources, given, others):
 MISTAKES = [
     # the good netlist's text, what takes its place, what the sentence says
     ("Rs s 0 4", "Rs s 0", ":14: rs has no value"),
+    ("Rs s 0 4", "T1 s 0 s 0 Z0=50", ":14: t1: write its delay, TD="),
     ("Rs s 0 4", "Rs s 0 tc1=1m", ":14: rs has no value"),
     ("Rs s 0 4", "Rs s", ":14: rs has too few nodes"),
     ("Rs s 0 4", "Rs s 0 four", ":14: rs: four is neither a number nor a model"),

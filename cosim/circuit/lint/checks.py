@@ -97,6 +97,8 @@ def _check_element(element: Element, scope: Scope, names: Names) -> None:
         element.refuse(" has neither V=… nor I=…")
     elif kind in "eg" and not element.words:
         element.refuse(" has no value")
+    elif kind == "t" and not {"td", "f"} & {word.partition("=")[0] for word in element.words}:
+        element.refuse(": write its delay, TD=…, or F=…, as ngspice would take 0.25 ns")
     elif kind in "fhw":
         _check_current_controlled(element, scope)
     elif kind == "k":
