@@ -86,30 +86,24 @@ def deck(
 
     Raises BadInput: for the netlist with its line, for the rest with what is wrong in the scene.
     """
-    lines, dropped = read(path)
-    asks = measures(dropped)
-    name = plain(path)
-    check_sources(path, lines, sources, called[0])
-    top, every = check_reading(
-        path, lines, words, asks, [[source.lower() for source in sources]], asked, called[1]
-    )
-    values = {**known, **own_parameters(top, name, parameters)}
+    netlist = checked(path, sources, words, asked=asked, called=called)
+    top = netlist.top
+    values = {**known, **own_parameters(top, plain(path), parameters)}
     fed = {source.lower() for source in sources}
     external = {
         each.line: "\n".join(_external(each, through)) for each in top.elements if each.name in fed
     }
-    read_as = reading(every, len(words) if asked else 0)
-    edge = edge_of(top, own_step(dropped), max_step, duration)
+    read_as = reading(netlist.words, len(words) if asked else 0)
     return Deck(
-        text_of(lines[0], top, external, values, duration, reltol, max_step, edge),
+        netlist.text(external, values, duration, reltol, max_step),
         {source.lower(): source[0].lower() for source in sources},
         tuple(vector for vector, _ in read_as),
-        tuple(every),
-        tuple(asks),
-        tuple(without_effect(dropped)),
+        netlist.words,
+        tuple(netlist.measures),
+        tuple(without_effect(netlist.dropped)),
         tuple(device if k < len(words) else "" for k, (_, device) in enumerate(read_as)),
         tuple(_pulses(top, fed)),
-        edge,
+        netlist.edge(max_step, duration),
     )
 
 
@@ -119,7 +113,7 @@ ngspice itself has only the first, which a long run with short steps makes less 
 times. Two sources that round one edge differently then cause a tiny step with noise of amperes."""
 
 
-def own_step(dropped: Sequence[Line]) -> float | None:
+def _own_step(dropped: Sequence[Line]) -> float | None:
     """The step, s, of the netlist's own .tran line; None without one: LTspice writes the stop time
     alone, or 0 for the step."""
     for line in dropped:
@@ -131,23 +125,6 @@ def own_step(dropped: Sequence[Line]) -> float | None:
     return None
 
 
-def edge_of(top: Scope, own: float | None, max_step: float, duration: float) -> float | None:
-    """The length, s, of edges whose rise or fall time is not given; None without PULSE and EXP.
-    Simulators differ in it; here it is the netlist's ``own`` step, or a run's longest, but at most
-    1 % of the shortest on-time or period of a PULSE, or without ``own`` of the run's longest step
-    where an expression has one of these."""
-    sources = [element.words for _, element, _ in top.order if element and element.kind in "vi"]
-    if not any({"pulse", "exp"} & {*words} for words in sources):
-        return None
-    lengths = [own or max_step, duration]
-    for words in sources:
-        if "pulse" in words:
-            values = [number(word) for word in words[words.index("pulse") + 1 :]]
-            lengths += [0.01 * value for value in values[5:7] if value]  # on-time and period
-            lengths += [0.01 * max_step] * (None in values[5:7] and own is None)
-    return min(lengths)
-
-
 _RANDOM = re.compile(r"(?<![\w.])(?:a?gauss|a?unif|trnoise|trrandom)(?=\s*\()", re.IGNORECASE)
 _SEEDED = re.compile(r"^\.opt\w*\s(?:.*\s)?seed\s*=", re.IGNORECASE | re.MULTILINE)
 
@@ -157,39 +134,68 @@ def drawn(text: str) -> list[str]:
     return [*dict.fromkeys(match[0].lower() for match in _RANDOM.finditer(text))]
 
 
-def text_of(
-    title: Line,
-    top: Scope,
-    external: Mapping[Line, str],
-    values: Mapping[str, float],
-    duration: float,
-    reltol: float,
-    max_step: float,
-    edge: float | None,
-) -> str:
-    """The deck for ngspice: the netlist with the lines of ``external`` sources replaced, ``values``
-    for the top level's parameters, a seed for random numbers if the netlist has none, and the
-    analysis; ``edge`` is that of :func:`edge_of`."""
-    text = [title.text]
-    for line, element, holder in top.order:
-        if holder is top and line in external:
-            text.append(external[line])
-        elif all(each.used for each in holder.chain()):  # something calls the subcircuit
-            free = (f" {key}=0" for key in sorted(holder.free) if line is holder.line)
-            text.append("".join([written(line, element, values if holder is top else {}), *free]))
-    lines = "\n".join(text)
-    if drawn(lines) and not _SEEDED.search(lines):
-        text.append(".options seed=1")
-    min_break = max(_ONE_BREAK * max_step, _ONE_TIME * duration)
-    text += [
-        # Without norefvalue ngspice reads the CPU time at each step, to print its progress.
-        f".options norefvalue reltol={reltol!r} minbreak={min_break!r}",
-        # All vectors are sent step by step; ngspice is to keep none, which would take memory.
-        ".save none",
-        f".tran {edge or max_step!r} {duration!r} 0 {max_step!r}",
-        ".end",
-    ]
-    return "\n".join(text)
+@dataclass(frozen=True)
+class Checked:
+    """A netlist that :func:`checked` has found sound."""
+
+    title: Line
+    top: Scope
+    words: tuple[str, ...]
+    """Vectors and expressions that are read: those asked for, then those that measures need."""
+    measures: Sequence[Measure] = ()
+    dropped: Sequence[Line] = ()
+    """Lines that ngspice does not see."""
+
+    def edge(self, max_step: float, duration: float) -> float | None:
+        """The length, s, of edges whose rise or fall time is not given; None without PULSE and EXP.
+        Simulators differ in it; here it is the netlist's own step, or a run's longest, but at most
+        1 % of the shortest on-time or period of a PULSE, or without an own one of the run's longest
+        step where an expression has one of these."""
+        every = (element for _, element, _ in self.top.order)
+        sources = [each.words for each in every if each and each.kind in "vi"]
+        if not any({"pulse", "exp"} & {*words} for words in sources):
+            return None
+        own = _own_step(self.dropped)
+        lengths = [own or max_step, duration]
+        for words in sources:
+            if "pulse" in words:
+                values = [number(word) for word in words[words.index("pulse") + 1 :]]
+                lengths += [0.01 * value for value in values[5:7] if value]  # on-time and period
+                lengths += [0.01 * max_step] * (None in values[5:7] and own is None)
+        return min(lengths)
+
+    def text(
+        self,
+        external: Mapping[Line, str],
+        values: Mapping[str, float],
+        duration: float,
+        reltol: float,
+        max_step: float,
+    ) -> str:
+        """The deck for ngspice: the netlist with the lines of ``external`` sources replaced,
+        ``values`` for the top level's parameters, a seed for random numbers if the netlist has
+        none, and the analysis."""
+        text = [self.title.text]
+        for line, element, holder in self.top.order:
+            if holder is self.top and line in external:
+                text.append(external[line])
+            elif all(each.used for each in holder.chain()):  # something calls the subcircuit
+                free = (f" {key}=0" for key in sorted(holder.free) if line is holder.line)
+                own = written(line, element, values if holder is self.top else {})
+                text.append("".join([own, *free]))
+        lines = "\n".join(text)
+        if drawn(lines) and not _SEEDED.search(lines):
+            text.append(".options seed=1")
+        min_break = max(_ONE_BREAK * max_step, _ONE_TIME * duration)
+        text += [
+            # Without norefvalue ngspice reads the CPU time at each step, to print its progress.
+            f".options norefvalue reltol={reltol!r} minbreak={min_break!r}",
+            # All vectors are sent step by step; ngspice is to keep none, which would take memory.
+            ".save none",
+            f".tran {self.edge(max_step, duration) or max_step!r} {duration!r} 0 {max_step!r}",
+            ".end",
+        ]
+        return "\n".join(text)
 
 
 def _external(element: Element, through: Sequence[tuple[str, str]]) -> Iterator[str]:
@@ -207,16 +213,21 @@ def _external(element: Element, through: Sequence[tuple[str, str]]) -> Iterator[
         yield f"Vcosim_gain{k} cosim_gain{k} 0 external"
 
 
-def check_sources(
+def checked(
     path: Path,
-    lines: Sequence[Line],
     sources: Sequence[str],
-    called: str = "[[port]] source",
+    words: Sequence[str],
+    required: Sequence[Sequence[str]] | None = None,
     kinds: str = "vi",
-) -> None:
-    """Raise BadInput for one of the ``sources`` that the netlist does not have, or not as one of
-    these kinds."""
-    found = {element.name: element for element in parse(lines).elements}
+    asked: bool = False,
+    called: tuple[str, str] = ("[[port]] source", "probe or circuit.save"),
+) -> Checked:
+    """Read a netlist in which the ``sources`` are of these ``kinds``, and to which sources are
+    added that read the ``words`` and those of its measurements; of the alternatives ``required``,
+    else the ``sources``, one must be there. Raises BadInput."""
+    lines, dropped = read(path)
+    asks, top, name = measures(dropped), parse(lines), plain(path)
+    found = {element.name: element for element in top.elements}
     for source in sources:
         if source.lower() not in found or source[0].lower() not in kinds:
             able = sorted(each for each in found if each[0] in kinds)
@@ -224,34 +235,19 @@ def check_sources(
             if lines[0].text.lower().split()[1] == source.lower():
                 hint = "; the first line of the netlist, where it stands, is the title"
             must = f"must be a {' or '.join(kinds.upper())} source of its own"
-            what = f'{called} = "{plain(source)}" {must}{hint}'
-            raise BadInput(ended(f"{plain(path)}: {what}"))
-
-
-def check_reading(
-    path: Path,
-    lines: Sequence[Line],
-    words: Sequence[str],
-    asks: Sequence[Measure],
-    required: Sequence[Sequence[str]],
-    asked: bool = False,
-    called: str = "probe or circuit.save",
-) -> tuple[Scope, list[str]]:
-    """Check a netlist to which sources are added that read the ``words`` and those of the
-    measurements ``asks``. Returns its top level, and all these words, each once."""
-    name = plain(path)
+            raise BadInput(ended(f'{name}: {called[0]} = "{plain(source)}" {must}{hint}'))
     for each in words:
         if not each.strip():
-            what = f'{called} = "{plain(each)}" must be a vector or an expression of the netlist'
+            what = f'{called[1]} = "{plain(each)}" must be a vector or an expression of the netlist'
             raise BadInput(f"{name}: {what}.")
-    every = {each: Line(each, f'{name}: {called} = "{plain(each)}"', 0) for each in words}
+    every = {each: Line(each, f'{name}: {called[1]} = "{plain(each)}"', 0) for each in words}
     for ask in asks:
         every |= {each: replace(ask.line, text=each) for each in ask.words if each not in every}
     direct = _direct([*every], len(words) if asked else 0)
     extra = [_source_of(k, line) for k, line in enumerate(every.values()) if direct[k] is None]
-    if every:
-        _check_vectors(parse(lines), every.values())
-    return check([*lines, *extra], required), [*every]
+    _check_vectors(top, every.values())
+    required = [[source.lower() for source in sources]] if required is None else required
+    return Checked(lines[0], check([*lines, *extra], required), tuple(every), asks, dropped)
 
 
 def reading(words: Sequence[str], asked: int = 0) -> list[tuple[str, str]]:

@@ -7,21 +7,14 @@ is treated alike; ``circuits/README.md`` says what it must have.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
-from cosim.circuit.joined import (
-    check_reading,
-    check_sources,
-    edge_of,
-    own_parameters,
-    own_step,
-    reading,
-    text_of,
-)
+from cosim.circuit.joined import Checked, checked, own_parameters, reading
 from cosim.circuit.lint.checks import REQUIRED as AGREED
 from cosim.circuit.lint.deck import Line, read, refuse
-from cosim.circuit.lint.elements import Element, Scope
+from cosim.circuit.lint.elements import Element
 from cosim.circuit.outputs import Measure, measures, without_effect
 from cosim.files.resources import circuits
 from cosim.scene import Scene
@@ -78,23 +71,21 @@ def prepare(scene: Scene) -> tuple[str, dict[str, str]]:
     """
     path, words = path_of(scene), _words(scene)
     if scene.circuit.netlist is None:
-        (title, top), every, own = _packaged(path), [], None
+        netlist = _packaged(path)
     else:  # read anew each time, as the file may have changed
         asked = (*words.values(), *(scene.circuit.save or ()))
-        title, top, every, own = _checked(path, scene.renamed, asked)
-        words |= {f"{OWN}{each}": each for each in every}
-    elements = top.elements
+        netlist = _checked(path, scene.renamed, asked)
+        words |= {f"{OWN}{each}": each for each in netlist.words}
+    title, elements = netlist.title, netlist.top.elements
     external = _external_sources(elements, scene.renamed)
     present = {node for element in elements for node in element.nodes}
     companion = scene.coupling.method == "companion"
     if companion:
         emf = scene.renamed.get("machine.back_emf", "vemf").lower()
         _carry_inertia(external, title, present, emf)
-    values = parameters(scene) | own_parameters(top, str(path), scene.circuit.param or {})
-    steps = scene.circuit.reltol, scene.circuit.max_step
-    duration = scene.run.duration
-    edge = edge_of(top, own, scene.circuit.max_step, duration)
-    text = text_of(title, top, external, values, duration, *steps, edge)
+    values = parameters(scene) | own_parameters(netlist.top, str(path), scene.circuit.param or {})
+    circuit, duration = scene.circuit, scene.run.duration
+    text = netlist.text(external, values, duration, circuit.reltol, circuit.max_step)
     for node in ("out", "sense"):
         if f"v({node})" not in words and node not in present:
             port = f', or a [[port]] to "machine.{node}"' if scene.renamed else ""
@@ -103,7 +94,7 @@ def prepare(scene: Scene) -> tuple[str, dict[str, str]]:
     saved |= {f"v({name})": f"v({name})" for name in OPTIONAL if name in present}
     if companion:
         saved[MOTIONAL] = MOTIONAL
-    vectors = dict(zip(every, reading(every), strict=True))
+    vectors = dict(zip(netlist.words, reading(netlist.words), strict=True))
     saved |= {name: vectors[word][0] for name, word in words.items()}
     return text, saved
 
@@ -114,20 +105,15 @@ def _words(scene: Scene) -> dict[str, str]:
     return {ends[end]: name for end, name in scene.renamed.items() if end in ends}
 
 
-def _checked(
-    path: Path, renamed: Mapping[str, str], words: tuple[str, ...]
-) -> tuple[Line, Scope, list[str], float | None]:
-    lines, dropped = read(path)
-    required = [[renamed[end].lower() for end in _SOURCES]] if renamed else AGREED
-    check_sources(path, lines, [renamed[end] for end in _SOURCES if renamed], kinds="v")
-    top, every = check_reading(path, lines, words, measures(dropped), required)
-    return lines[0], top, every, own_step(dropped)
+def _checked(path: Path, renamed: Mapping[str, str], words: tuple[str, ...]) -> Checked:
+    sources = [renamed[end] for end in _SOURCES if renamed]
+    return checked(path, sources, words, None if renamed else AGREED, "v")
 
 
 @cache
-def _packaged(path: Path) -> tuple[Line, Scope]:
-    """A netlist of the package, read once a process."""
-    return _checked(path, {}, ())[:2]
+def _packaged(path: Path) -> Checked:
+    """A netlist of the package, read once a process; a run's step sets its edges, not its own."""
+    return replace(_checked(path, {}, ()), dropped=())
 
 
 def asked_for(scene: Scene) -> tuple[list[Measure], list[str]]:
