@@ -8,12 +8,12 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from cosim.circuit.lint.checks import check
 from cosim.circuit.lint.deck import Line, passed, read, refuse
 from cosim.circuit.lint.elements import Element, Scope, node, parse
 from cosim.circuit.lint.expressions import sensed
+from cosim.circuit.lint.topology import Expansion
 from cosim.circuit.lint.words import definitions, number
 from cosim.circuit.lint.write import written
 from cosim.circuit.outputs import Measure, measures, without_effect
@@ -315,15 +315,7 @@ def own_parameters(top: Scope, name: str, given: Mapping[str, float]) -> dict[st
 
 def _pulses(top: Scope, fed: set[str]) -> Iterator[str]:
     """ngspice's names of the sources with PULSE, such as ``v.x1.x2.v3``, but for those fed."""
-    for path, element in _everywhere(top, ""):
+    for part in Expansion(top).parts(top, {}):
+        path, element = part.path, part.element
         if element.kind in "vi" and "pulse" in element.words and (path or element.name not in fed):
             yield f"{element.kind}.{path}{element.name}" if path else element.name
-
-
-def _everywhere(scope: Scope, path: str) -> Iterator[tuple[str, Element]]:
-    """Each element, also those in subcircuits, with the path of calls that lead to it."""
-    for element in scope.elements:
-        yield path, element
-        called: Any = scope.subcircuit(element.model or "") if element.kind == "x" else None
-        if called is not None and len(called) == 1:
-            yield from _everywhere(called[0], f"{path}{element.name}.")

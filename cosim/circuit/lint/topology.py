@@ -31,7 +31,8 @@ class Part:
     element: Element
     nodes: tuple[str, ...]
     senses: tuple[str, ...]
-    top: bool
+    path: str
+    """The names of the calls that lead to it, with a point behind each; "" at the top level."""
 
 
 class _Groups:
@@ -56,8 +57,8 @@ class _Groups:
 
 def check_topology(top: Scope) -> None:
     """Raise BadInput for a circuit that has no operating point, whatever its values."""
-    circuit = _Expansion(top)
-    parts = list(circuit.parts(top, {}, "", 0))
+    circuit = Expansion(top)
+    parts = list(circuit.parts(top, {}))
     held = _held(top)
     terminals = Counter(name for part in parts for name in part.nodes)
     if GROUND not in terminals:
@@ -69,7 +70,7 @@ def check_topology(top: Scope) -> None:
 
 
 @dataclass
-class _Expansion:
+class Expansion:
     """Expands subcircuits, and collects their pins."""
 
     top: Scope
@@ -77,7 +78,9 @@ class _Expansion:
     joints: set[str] = field(default_factory=set)
     """Nodes that are pins of subcircuits."""
 
-    def parts(self, scope: Scope, pins: dict[str, str], path: str, depth: int) -> Iterator[Part]:
+    def parts(
+        self, scope: Scope, pins: dict[str, str], path: str = "", depth: int = 0
+    ) -> Iterator[Part]:
         def outer(name: str) -> str:
             if name == GROUND or name in self.top.globals:
                 return name
@@ -99,7 +102,7 @@ class _Expansion:
             else:
                 read = [*element.controls, *sensed(element.line.text, "v")]
                 senses = tuple(outer(GROUND if name == "gnd" else name) for name in read)
-                yield Part(element, nodes, senses, scope is self.top)
+                yield Part(element, nodes, senses, path)
 
 
 def _held(top: Scope) -> set[str]:
@@ -117,7 +120,7 @@ def _check_ends(parts: list[Part], terminals: Counter[str], held: set[str]) -> N
             if name != GROUND and name not in terminals and not re.search(r"[.:]", name):
                 refuse(line, f"nothing is connected to the node {shown(name)}")
         for name in part.nodes:
-            leaf = part.top and part.element.kind in _LEAF
+            leaf = not part.path and part.element.kind in _LEAF
             excused = (
                 name in seen or name in held or name == GROUND or name.startswith(("nc", "n/c"))
             )
