@@ -228,8 +228,6 @@ class _Reader:
                 return True
             elif (text := self._passed(line, opened[-1])) is not None:
                 self.depth += (word == ".subckt") - (word == ".ends")
-                if text.startswith(UNKNOWN) and self.depth < 1:
-                    refuse(line, text.removeprefix(UNKNOWN))
                 self._add(self.lines, Line(text, line.file, line.number))
             else:
                 self._add(self.dropped, line)
@@ -407,8 +405,7 @@ def _directive(line: Line) -> tuple[str, str]:
 
 
 def passed(line: Line) -> str | None:
-    """The text of a logical line if ngspice may see it; None if the line is dropped; ``UNKNOWN``
-    and a reason if only the use of its subcircuit is to be refused. Raises BadInput."""
+    """The text of a logical line if ngspice may see it, None if it is dropped. Raises BadInput."""
     word, rest = _directive(line)
     if "ng_script" in line.text.lower():
         refuse(line, "ng_script would make the netlist a script of commands")
@@ -437,7 +434,7 @@ def passed(line: Line) -> str | None:
         name = line.text.split()[0]
         known = f" but {_GATES}" if name[0] in "aA" else ""
         cure = f"{'take a model for PSpice, or ' * bool(known)}write it with R, C and B sources"
-        return f"{UNKNOWN}{shown(name)} is no element that a netlist may have{known}; {cure}"
+        refuse(line, f"{shown(name)} is no element that a netlist may have{known}; {cure}")
     return line.text
 
 
@@ -463,7 +460,7 @@ def _model(line: Line) -> str:
         refuse(line, f"{shown(line.text)} is no complete .model line")
     kind = match[1].lower().split()[-1]  # "ako:BASE" where no type follows it
     if kind not in MODELS and not kind.startswith("ako:"):
-        return f"{UNKNOWN}models of type {shown(kind)} are not allowed in a netlist"
+        refuse(line, f"models of type {shown(kind)} are not allowed in a netlist")
     if kind in MODELS - {"nmos", "pmos"}:
         return line.text
     for equals, level in _LEVEL.findall(line.text):

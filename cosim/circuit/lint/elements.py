@@ -158,8 +158,9 @@ class _Parser:
                 self.scope.bad_models[name.lower()] = BadInput(f"{line.place}: {reason}.")
                 continue
             try:
-                if not line.text.startswith(UNKNOWN):
-                    _check_brackets(line)
+                if line.text.startswith(UNKNOWN):
+                    refuse(line, line.text.removeprefix(UNKNOWN))
+                _check_brackets(line)
                 self._take(line)
             except BadInput as error:
                 word, *name = words(line.text)[:2]
@@ -278,9 +279,6 @@ class _Parser:
             scope.used = True
             if scope.broken:
                 raise scope.broken
-            for line, _ in scope.lines:
-                if line.text.startswith(UNKNOWN):
-                    refuse(line, line.text.removeprefix(UNKNOWN))
             for element in scope.elements:
                 _place(element, scope)
                 if element.kind == "x":
