@@ -15,15 +15,16 @@ import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from ctypes import addressof
 from functools import cache
-from typing import Any, Protocol
+from typing import Any, ClassVar
 
 from PySpice.Spice.NgSpice import Shared
 
 from cosim.circuit.joined import drawn
 from cosim.circuit.lint.words import sent
 from cosim.errors import BadInput, SimulationFailed, plain
-from cosim.toolchain.libraries import ngspice_library
+from cosim.toolchain.libraries import library, ngspice_library
 from cosim.toolchain.processes import retire
 
 _ffi: Any = Shared.ffi
@@ -51,23 +52,30 @@ LOOSER = "abstol=1e-8 vntol=1e-5 chgtol=1e-11"
 are switched, no step is small enough for them."""
 
 
-class Leader(Protocol):
+class Leader:
     """A run, for which the compiled callbacks act."""
 
+    kind: ClassVar[str]
+    """"lead" or "ports": its functions in the compiled loop are KIND_begin and KIND_finish."""
+    state: Any
+    """The structure that the callbacks take."""
     places: Any
     """ctypes array, to be filled: indices of the saved vectors, then of time, among those sent."""
 
     def begin(self) -> None:
         """The callbacks act for this run from now on."""
+        getattr(library("loop"), f"{self.kind}_begin")(addressof(self.state))
 
     def finish(self) -> None:
         """The run has ended; the callbacks were not told of the end of the last step."""
+        getattr(library("loop"), f"{self.kind}_finish")(addressof(self.state))
 
     def loaded(self, engine: "Engine") -> None:
         """The circuit is loaded, its run not yet begun."""
 
     def stop(self) -> None:
         """Make the run fail: the sources become NaN, so that no step succeeds."""
+        self.state.stopped = 1
 
 
 @cache

@@ -22,7 +22,6 @@ from cosim.coupling.loop.structures import (
     LeadState,
     address,
     callback,
-    loop,
 )
 from cosim.drive.pieces import Ahead, Command
 from cosim.errors import SimulationFailed, StepTooSmall
@@ -53,8 +52,10 @@ _POINTS = 4096
 """Accepted points that the log's block holds before it is emptied."""
 
 
-class Lead:
+class Lead(ngspice.Leader):
     """ngspice leads; the mechanics follow each accepted step, or at macro points set by ``use``."""
+
+    kind = "lead"
 
     def __init__(
         self,
@@ -143,20 +144,6 @@ class Lead:
         called = callback(macro_point, engine().fail)
         self._macro_point = macro_point, called  # keeps both alive; the structure does not
         self.state.macro_point = ctypes.cast(called, ctypes.c_void_p).value
-
-    # The functions that ngspice's engine calls (see cosim.circuit.ngspice.Leader).
-
-    def begin(self) -> None:
-        loop().lead_begin(ctypes.byref(self.state))
-
-    def finish(self) -> None:
-        loop().lead_finish(ctypes.byref(self.state))
-
-    def loaded(self, engine: object) -> None:
-        """Nothing is to be asked of the circuit."""
-
-    def stop(self) -> None:
-        self.state.stopped = 1
 
     def _attend(self) -> None:
         """Take the log away."""

@@ -21,7 +21,6 @@ from cosim.coupling.loop.structures import (
     StrangerState,
     Through,
     callback,
-    loop,
 )
 from cosim.coupling.ports.plan import Plan
 from cosim.drive.command import command
@@ -64,8 +63,10 @@ _STATUSES = {
 """Words for the status of an FMU's call, used where the FMU gives no message."""
 
 
-class Run:
+class Run(ngspice.Leader):
     """A run under way, and its logs."""
+
+    kind = "ports"
 
     def __init__(self, scene: Scene, progress: Callable[[float], None]) -> None:
         self._scene, self._progress = scene, progress
@@ -203,11 +204,6 @@ class Run:
             f"The FMU {side.name} failed at t = {self.state.told:.6g} s: {words}{cure}."
         )
 
-    # The functions that ngspice's engine calls (see cosim.circuit.ngspice.Leader).
-
-    def begin(self) -> None:
-        loop().ports_begin(ctypes.byref(self.state))
-
     def loaded(self, engine: ngspice.Engine) -> None:
         """Pass on the addresses of ngspice's functions, and the corners of PULSE sources."""
         state, run = self.state, self._scene.run
@@ -223,12 +219,6 @@ class Run:
         ]
         self._pulses = _array(Pulse, pulses)
         state.pulses, state.n_pulses = ctypes.addressof(self._pulses), len(pulses)
-
-    def finish(self) -> None:
-        loop().ports_finish(ctypes.byref(self.state))
-
-    def stop(self) -> None:
-        self.state.stopped = 1
 
     def _attend(self) -> None:
         """Take the logs away."""
