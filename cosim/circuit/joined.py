@@ -243,8 +243,12 @@ def checked(
     every = {each: Line(each, f'{name}: {called[1]} = "{plain(each)}"', 0) for each in words}
     for ask in asks:
         every |= {each: replace(ask.line, text=each) for each in ask.words if each not in every}
-    direct = _direct([*every], len(words) if asked else 0)
-    extra = [_source_of(k, line) for k, line in enumerate(every.values()) if direct[k] is None]
+    read_as = reading([*every], len(words) if asked else 0)
+    extra = [
+        _source_of(k, line)
+        for k, line in enumerate(every.values())
+        if read_as[k][0] == f"v({_NODE}{k})"
+    ]
     _check_vectors(top, every.values())
     required = [[source.lower() for source in sources]] if required is None else required
     return Checked(lines[0], check([*lines, *extra], required), tuple(every), asks, dropped)
@@ -254,23 +258,16 @@ def reading(words: Sequence[str], asked: int = 0) -> list[tuple[str, str]]:
     """For each of the words the vector and the device parameter ("" without one) that have its
     value. The first ``asked`` words are also read within a step, by the parameter."""
     found = []
-    for place, match in enumerate(_direct(words, asked)):
-        if match is None:
-            found.append((f"v({_NODE}{place})", f"@bcosim{place}[v]"))
-        else:
-            kind, inner = match[1].lower(), match[2].lower()
-            found.append((f"{kind}({inner})", f"@{inner}[i]" if kind == "i" else ""))
-    return found
-
-
-def _direct(words: Sequence[str], asked: int) -> list[re.Match[str] | None]:
-    # Matches of words that are vectors; None where a B source must compute one: within a step any
-    # node's voltage, and always a current that ngspice has no vector for.
-    found = []
     for k, each in enumerate(words):
         match, current = _VECTOR.fullmatch(each), each[:1].lower() == "i"
+        # A B source must compute within a step any node's voltage, and always a current that
+        # ngspice has no vector for.
         able = match and match[2][:1].lower() in _CURRENTS if current else k >= asked
-        found.append(match if able else None)
+        if match and able:
+            inner = match[2].lower()
+            found.append((f"i({inner})", f"@{inner}[i]") if current else (f"v({inner})", ""))
+        else:
+            found.append((f"v({_NODE}{k})", f"@bcosim{k}[v]"))
     return found
 
 
