@@ -12,7 +12,14 @@ from itertools import pairwise
 from cosim.circuit.lint.deck import Line, refuse, shown
 from cosim.circuit.lint.dialect import FUNCTIONS
 from cosim.circuit.lint.elements import Element, Scope
-from cosim.circuit.lint.words import closing, definitions, number, split_arguments, word_set
+from cosim.circuit.lint.words import (
+    closing,
+    definitions,
+    number,
+    split_arguments,
+    unbraced,
+    word_set,
+)
 
 _RANDOM = {"agauss": 3, "gauss": 3, "aunif": 2, "unif": 2, "limit": 2}
 _ONE_ARGUMENT = word_set(
@@ -383,8 +390,3 @@ def _functions(line: Line) -> Iterator[_Function]:
 
 def _formals(text: str) -> tuple[str, ...]:
     return tuple(re.findall(r"\w+", text))
-
-
-def unbraced(text: str) -> str:
-    """The text with the content of braces and quotes replaced by as many blanks."""
-    return re.sub(r"\{[^{}]*\}|'[^']*'", lambda match: f"{{{' ' * (len(match[0]) - 2)}}}", text)

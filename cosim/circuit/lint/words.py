@@ -3,7 +3,7 @@
 import re
 
 _ASSIGNED = re.compile(r"\s*(?<![<>=!])=(?!=)\s*")  # "=", but no comparison
-_DEFINITION = re.compile(r"([a-z_]\w*)\s*(\([^()]*\))?\s*=(?!=)\s*", re.IGNORECASE)
+_DEFINITION = re.compile(r"(?<!\w)([a-z_]\w*)\s*(\([^()]*\))?\s*=(?!=)\s*")
 
 
 NUMBER = re.compile(
@@ -93,22 +93,17 @@ def split_arguments(text: str) -> list[str]:
 def definitions(text: str) -> list[tuple[tuple[str, str | None], str]]:
     """The definitions of a ``.param`` line: name, formal parameters (of a function), expression."""
     body = text.partition(" ")[2].lower()
-    starts: list[re.Match[str]] = []
-    place = 0
-    while place < len(body):
-        match = _DEFINITION.match(body, place)
-        if match and (place == 0 or not (body[place - 1].isalnum() or body[place - 1] == "_")):
-            starts.append(match)
-            place = match.end()
-        elif body[place] in "{'":
-            place = closing(body, place)
-        else:
-            place += 1
+    starts = [*_DEFINITION.finditer(unbraced(body))]
     ends = [match.start() for match in starts[1:]] + [len(body)]
     return [
         ((match[1], match[2]), body[match.end() : end].strip(" ,"))
         for match, end in zip(starts, ends, strict=False)
     ]
+
+
+def unbraced(text: str) -> str:
+    """The text with the content of braces and quotes replaced by as many blanks."""
+    return re.sub(r"\{[^{}]*\}|'[^']*'", lambda match: f"{{{' ' * (len(match[0]) - 2)}}}", text)
 
 
 def split_assignments(found: list[str]) -> tuple[list[str], list[str]]:
