@@ -5,7 +5,7 @@ mean current, and the circuit keeps the back-EMF of the last step. It needs a pr
 since a process has one ngspice and ours has other callbacks.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from time import process_time
@@ -88,7 +88,9 @@ def _run(scene: Scene, _: Callable[[float], None], times: Sequence[float]) -> tu
     known, deck = references(3), _deck(scene)
     shared = Shared(known["current"], [known["back_emf"], known["z_part"]])
     began = process_time()
-    path = np.interp(times, *shared.follow(_instance(scene), deck))
+    reals, integers = ({known[name]: x for name, x in of.items()} for of in parameters(scene))
+    fmu = _instance(unpacked(3), token(), MODEL, reals, integers)
+    path = np.interp(times, *shared.follow(fmu, deck))
     return process_time() - began, path
 
 
@@ -96,21 +98,12 @@ def _run_motor(
     scene: Scene, _: Callable[[float], None], times: Sequence[float]
 ) -> tuple[float, Array]:
     (fmu,), (port, _probe) = scene.fmu, scene.port
-    folder = str(fmu.file)
-    described = read_model_description(folder, validate=False)
+    described = read_model_description(str(fmu.file), validate=False)
     known = {each.name: each.valueReference for each in described.modelVariables}
     shared = Shared(known["torque"], [known["speed"]], port.scale)
     began = process_time()
-    gear = FMU3Slave(
-        guid=described.guid,
-        unzipDirectory=folder,
-        modelIdentifier=Path(folder).name,
-        instanceName="peer",
-    )
-    gear.instantiate()
-    gear.setFloat64([known[name] for name in fmu.parameters], [*fmu.parameters.values()])
-    gear.enterInitializationMode()
-    gear.exitInitializationMode()
+    given = {known[name]: value for name, value in fmu.parameters.items()}
+    gear = _instance(Path(fmu.file), described.guid, Path(fmu.file).name, given, {})
     # Its own are not wanted, and all vectors are sent to Python.
     dropped = ("bcosim", ".save none")
     lines = [line for line in Plan(scene).deck().text.splitlines() if not line.startswith(dropped)]
@@ -118,16 +111,17 @@ def _run_motor(
     return process_time() - began, path
 
 
-def _instance(scene: Scene) -> FMU3Slave:
+def _instance(
+    folder: Path, guid: Any, model: str, reals: Mapping[int, Any], integers: Mapping[int, Any]
+) -> FMU3Slave:
+    """An instance with these parameters, by their references."""
     fmu = FMU3Slave(
-        guid=token(), unzipDirectory=str(unpacked(3)), modelIdentifier=MODEL, instanceName="peer"
+        guid=guid, unzipDirectory=str(folder), modelIdentifier=model, instanceName="peer"
     )
-    known = references(3)
-    reals, integers = parameters(scene)
     fmu.instantiate()
     fmu.enterInitializationMode()
-    fmu.setFloat64([known[name] for name in reals], list(reals.values()))
-    fmu.setInt32([known[name] for name in integers], list(integers.values()))
+    fmu.setFloat64([*reals], [*reals.values()])
+    fmu.setInt32([*integers], [*integers.values()])
     fmu.exitInitializationMode()
     return fmu
 
