@@ -15,7 +15,7 @@ from pathlib import Path
 from unicodedata import category
 
 from cosim.circuit.lint.dialect import in_ngspice, in_ngspice_together, prelude, since_the_start
-from cosim.circuit.lint.lines import MAX_LINE, UNKNOWN, Line, reason_of, refuse, shown
+from cosim.circuit.lint.lines import MAX_LINE, Line, refuse, shown, unusable
 from cosim.circuit.lint.words import definitions, number, word_set
 from cosim.errors import BadInput, plain
 from cosim.files import reader
@@ -226,21 +226,22 @@ class _Reader:
                 for after in lines:
                     refuse(after, "there is text after .end, which must come last")
                 return True
-            elif (text := self._passed(line, opened[-1])) is not None:
+            elif kept := self._passed(line, opened[-1]):
                 self.depth += (word == ".subckt") - (word == ".ends")
-                self._add(self.lines, Line(text, line.file, line.number))
+                self._add(self.lines, kept)
             else:
                 self._add(self.dropped, line)
         return found
 
-    def _passed(self, line: Line, base: Path) -> str | None:
+    def _passed(self, line: Line, base: Path) -> Line | None:
         """``passed``, but of a subcircuit, which nobody may need, only the use is to be refused."""
         try:
-            return passed(self._with_points(line, base))
+            text = passed(self._with_points(line, base))
+            return None if text is None else replace(line, text=text)
         except BadInput as error:
             if self.depth < 1 or _directive(line)[0] in (".subckt", ".ends"):
                 raise
-            return f"{UNKNOWN}{reason_of(error, line)}"
+            return unusable(line, error, ".unknown")
 
     def _add(self, lines: list[Line], line: Line) -> None:
         if len(lines) >= MAX_LINES:

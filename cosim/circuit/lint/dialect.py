@@ -16,7 +16,7 @@ from math import pi
 from typing import Any
 
 from cosim.circuit.lint.laplace import without_laplace
-from cosim.circuit.lint.lines import COPY, MAX_LINE, NO_MODEL, Line, reason_of, refuse, shown
+from cosim.circuit.lint.lines import COPY, MAX_LINE, Line, refuse, shown, unusable
 from cosim.circuit.lint.words import closing, number, split_arguments, word_set, words
 from cosim.errors import BadInput
 
@@ -282,7 +282,7 @@ def in_ngspice_together(lines: Sequence[Line]) -> list[Line]:
                 if law:
                     lines[place] = replace(line, text=told and f".told {told}")
             except BadInput as error:
-                lines[place] = _unusable(line, error)
+                lines[place] = unusable(line, error, f".model {words(line.text)[1]}")
         elif text.startswith(".ic"):
             for name, current in _CURRENT.findall(text):
                 if (scope, name) not in elements:
@@ -352,12 +352,7 @@ def _complete(lines: list[Line], scopes: Sequence[tuple[int, ...]]) -> None:
         try:
             complete(place)
         except BadInput as error:
-            lines[place] = _unusable(line, error)
-
-
-def _unusable(line: Line, error: BadInput) -> Line:
-    """In place of a model's line, what is to be said where the model is used."""
-    return replace(line, text=f"{NO_MODEL}{words(line.text)[1]} {reason_of(error, line)}")
+            lines[place] = unusable(line, error, f".model {words(line.text)[1]}")
 
 
 def _scopes(lines: Sequence[Line]) -> Iterator[tuple[int, ...]]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from itertools import accumulate
 from typing import NoReturn
 
-from cosim.circuit.lint.lines import COPY, NO_MODEL, UNKNOWN, Line, refuse, shown
+from cosim.circuit.lint.lines import COPY, Line, refuse, shown
 from cosim.circuit.lint.words import definitions, split_assignments, words
 from cosim.errors import BadInput
 
@@ -153,13 +153,9 @@ class _Parser:
         for line in lines[1:]:
             if flat:
                 self._leave(line)
-            if line.text.startswith(NO_MODEL):
-                name, _, reason = line.text.removeprefix(NO_MODEL).partition(" ")
-                self.scope.bad_models[name.lower()] = BadInput(f"{line.place}: {reason}.")
-                continue
             try:
-                if line.text.startswith(UNKNOWN):
-                    refuse(line, line.text.removeprefix(UNKNOWN))
+                if line.bad:
+                    refuse(line, line.bad)
                 _check_brackets(line)
                 self._take(line)
             except BadInput as error:

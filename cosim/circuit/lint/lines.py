@@ -1,15 +1,11 @@
 """A netlist's logical line, and how one is refused."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NoReturn
 
 from cosim.errors import BadInput, printable
 
 MAX_LINE = 200_000
-UNKNOWN = ".unknown "
-"""Begins the replacement of a line that ngspice must not see; the reason follows."""
-NO_MODEL = ".nomodel "
-"""Begins that of a model; its name and the reason follow."""
 COPY = "; copy its .model line into the netlist"
 
 
@@ -21,6 +17,8 @@ class Line:
     file: str
     number: int
     """The first of its lines in the file; 0 for text from elsewhere."""
+    bad: str = ""
+    """The reason not to use it, or the model of which ``text`` then has the name alone."""
 
     @property
     def place(self) -> str:
@@ -32,9 +30,10 @@ def refuse(line: Line, reason: str) -> NoReturn:
     raise BadInput(f"{line.place}: {reason}.")
 
 
-def reason_of(error: BadInput, line: Line) -> str:
-    """The reason with which ``refuse`` raised an error for the line."""
-    return str(error).removeprefix(f"{line.place}: ").removesuffix(".")
+def unusable(line: Line, error: BadInput, text: str) -> Line:
+    """In place of a line for which ``refuse`` raised an error, what is to be said if it is used."""
+    reason = str(error).removeprefix(f"{line.place}: ").removesuffix(".")
+    return replace(line, text=text, bad=reason)
 
 
 def shown(text: str) -> str:
