@@ -29,6 +29,7 @@ _TOLD = 10_000  # rows between two reports of progress
 _CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029]")
 _DIGITS = r"[+-]?(?:[0-9]++{0}?[0-9]*+|{0}[0-9]++)(?:[eE][+-]?[0-9]++)?"  # {0}: decimal sign
 _NUMBER = {sign: re.compile(_DIGITS.format(re.escape(sign))) for sign in ".,"}
+_ASIDE = ("#", "sep=")
 _QUOTED = re.compile(r' *"((?:[^"]|"")*+)" *')
 
 
@@ -40,7 +41,7 @@ class Cells:
     separator: str
     rows: list[tuple[int, list[str]]]
     comments: list[str]
-    """Lines that begin with #."""
+    """Lines that begin with #, or with the sep= of Excel."""
     _signs: dict[str, tuple[int, str]] = field(default_factory=dict)
     """Where each decimal sign was met first: row and column."""
 
@@ -114,8 +115,8 @@ def read_cells(path: Path) -> Cells:
             f"{name}: row {row}: the control character U+{ord(odd[0]):04X} cannot stand in a table."
         )
     numbered = [(n, line) for n, line in enumerate(lines, 1) if line and not line.isspace()]
-    comments = [line for _, line in numbered if line.startswith("#")]
-    kept = [(n, line) for n, line in numbered if not line.startswith("#")]
+    comments = [line for _, line in numbered if line.startswith(_ASIDE)]
+    kept = [(n, line) for n, line in numbered if not line.startswith(_ASIDE)]
     if not kept:
         raise BadInput(f"{name}: this file holds no table.")
     separator = next((sign for sign in "\t;" if any(sign in line for _, line in kept[:2])), ",")
@@ -133,10 +134,11 @@ def read_cells(path: Path) -> Cells:
 
 
 def _decoded(data: bytes) -> str:
-    """The text; bytes that are no UTF-8 become U+FFFD, which is no number."""
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return data.decode("utf-16", errors="replace")
-    return data.decode("utf-8-sig", errors="replace")
+    """The text, of UTF-8, UTF-16 with its mark, or else code page 1252, as Excel's CSV has it."""
+    try:
+        return data.decode("utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", errors="replace")
 
 
 def _cells(line: str, separator: str, name: str, row: int) -> Iterator[str]:

@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import islice
 from math import isfinite
 from operator import attrgetter
 from pathlib import Path
@@ -33,6 +34,9 @@ from cosim.scene.tables import (
 )
 
 _LIBRARY = Path(__file__).with_name("library")
+
+MOST_TOLD = 5
+"""Most unknown names of a file that one message tells."""
 
 
 @dataclass(frozen=True)
@@ -184,10 +188,15 @@ def _spelt(value: Any) -> str:
     return value if isinstance(value, str) else toml_value(value).replace(" ", "")
 
 
+_NO_SCENES = {
+    suffix: f"a scene names it; cosim new --kind {kind} makes one to begin with"
+    for suffix, kind in ((".cir", "circuit"), (".net", "circuit"), (".fmu", "fmu"))
+} | {".csv": "cosim compare lays one over a recording, and drive.file moves the surface as one"}
+
+
 def _read(source: str, origin: str, builtin: list[str]) -> dict[str, Any]:
     """The content of a scene file."""
-    if kind := {".cir": "circuit", ".net": "circuit", ".fmu": "fmu"}.get(Path(source).suffix):
-        how = f"a scene names it; cosim new --kind {kind} makes one to begin with"
+    if how := _NO_SCENES.get(Path(source).suffix):
         raise BadInput(f"{origin}: must be a scene, a .toml: {how}.")
     try:
         return toml.read(source)
@@ -204,6 +213,13 @@ def _read(source: str, origin: str, builtin: list[str]) -> dict[str, Any]:
 
 
 def _check_names(data: dict[str, Any], origin: str) -> None:
+    told = " ".join(map(messages.ended, islice(_unknown(data, origin), MOST_TOLD)))
+    if told:
+        raise BadInput(f"{origin}: {told.replace(' there is no', ' There is no')}")
+
+
+def _unknown(data: dict[str, Any], origin: str) -> Iterator[str]:
+    """A sentence, "there is no …", on each table and key that is not known."""
     for name, content in data.items():
         if name in ("name", "description", "base"):
             continue
@@ -211,14 +227,15 @@ def _check_names(data: dict[str, Any], origin: str) -> None:
             _check_list(name, content, origin)
             continue
         if name not in TABLES:
-            raise messages.bad(f"{origin}: {messages.unknown_table(name)}")
+            yield messages.unknown_table(name)
+            continue
         if not isinstance(content, dict):
             raise BadInput(f"{origin}: {name} = {messages.shown(content)} must be a table.")
         known = TABLES[name].model_fields
         for key in content:
             single = {"drive": LEVEL_KEY, "circuit": PARAM_KEY}.get(name)
             if key not in known and not (single and single.fullmatch(key)):
-                raise messages.bad(f"{origin}: {messages.unknown_key(name, key)}")
+                yield messages.unknown_key(name, key)
 
 
 def _check_list(name: str, content: Any, origin: str) -> None:

@@ -278,7 +278,7 @@ def _tracker_names(path: str, line: int, tracks: list[str], head: list[str]) -> 
     if not {"zp", "zo"} & set(found):
         named = ", ".join(filter(None, tracks)) or "none"
         raise BadInput(
-            f"{path}: row {line}: the tracks platform or part are needed with their heights y "
-            f"(found: {named})."
+            f"{path}: row {line}: no track is called platform or part and has heights y "
+            f"(found: {named}): write these names over the tracks' first columns, or in Tracker."
         )
     return found

@@ -100,6 +100,13 @@ def test_what_spreadsheets_write(kind: str, encoding: str, tmp_path: Path) -> No
     assert values(kind, path) == [k + 0.5 for k in range(10)]
 
 
+def test_what_a_german_excel_writes(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    rows = [f"{k};{k},5" for k in range(10)]
+    path.write_text("\n".join(["sep=;", "time [s];surface [µm]", *rows]), encoding="cp1252")
+    np.testing.assert_allclose(read_table(path).columns["z_surface"], (np.arange(10) + 0.5) / 1e6)
+
+
 NUMBERS = st.floats(-1e300, 1e300)
 
 

@@ -230,10 +230,28 @@ def test_no_circuit_has_the_staircase_unless_asked() -> None:
     assert load("paper-full", ["drive.quantised=true"]).drive.quantised
 
 
-@pytest.mark.parametrize(("file", "kind"), [("mine.cir", "circuit"), ("mine.fmu", "fmu")])
-def test_what_a_scene_names_is_no_scene(file: str, kind: str) -> None:
-    with pytest.raises(BadInput, match=rf"^{file}: must be a scene, .* cosim new --kind {kind} "):
+@pytest.mark.parametrize(
+    ("file", "cure"),
+    [
+        ("mine.cir", "cosim new --kind circuit "),
+        ("mine.fmu", "cosim new --kind fmu "),
+        ("mine.csv", "cosim compare "),
+    ],
+)
+def test_what_a_scene_names_is_no_scene(file: str, cure: str) -> None:
+    with pytest.raises(BadInput, match=rf"^{file}: must be a scene, .* {cure}"):
         load(file)
+
+
+def test_all_unknown_names_are_told_at_once(tmp_path: Path) -> None:
+    path = written(tmp_path, "[drive]\nfrequncy = 20\namplitud = 3\n[cirucit]\n")
+    with pytest.raises(BadInput) as caught:
+        load(path)
+    assert str(caught.value) == (
+        f'{path}: there is no key "drive.frequncy"; did you mean drive.frequency? There is no key '
+        '"drive.amplitud"; did you mean drive.amplitude? There is no table "cirucit"; did you mean '
+        "circuit?"
+    )
 
 
 def test_file_changes_only_its_keys(tmp_path: Path) -> None:
