@@ -12,6 +12,7 @@ from cosim.scene.describe import KEYS, Key, keys
 from cosim.scene.rungs import OF_PORTS, RUNGS, Rung
 from cosim.scene.tables import (
     COMMANDS,
+    FRAME_RATE,
     GIVEN_SURFACES,
     KNOBS,
     MACHINE,
@@ -141,6 +142,11 @@ class Scene(BaseModel):
         known = {name: getattr(self.run, name) for name in given}
         run = Run.model_construct(given, **fitted | known)
         object.__setattr__(self, "run", run)
+        if run.average == "slope" and run.duration - run.settle < 0.99 / FRAME_RATE:
+            raise fault(
+                f"run.settle = {run.settle:g} s leaves less than two frames, 1/{FRAME_RATE:g} s "
+                f'apart, of run.duration = {run.duration:g} s: run.average = "slope" needs them'
+            )
 
     def _check_ports(self) -> None:
         """Check ports as far as possible without reading the FMUs and the netlist."""

@@ -575,11 +575,6 @@ class Run(Table):
                 raise fault(
                     f"run.{key} = {value:g} s must be below run.duration = {self.duration:g} s"
                 )
-        if self.average == "slope" and self.duration - self.settle < 0.99 / FRAME_RATE:
-            raise fault(
-                f"run.settle = {self.settle:g} s leaves less than two frames, 1/{FRAME_RATE:g} s "
-                f'apart, of run.duration = {self.duration:g} s: run.average = "slope" needs them'
-            )
         if self.duration / self.output_step > MAX_ROWS:
             raise fault(
                 f"run.output_step = {self.output_step:g} s makes more than {MAX_ROWS} rows in "

@@ -577,12 +577,18 @@ def test_nothing_heavy_is_imported() -> None:
     ("settings", "said"),
     [
         ({"run.average": "slope", "run.settle": 0.1995}, "less than two frames"),
+        ({"run.average": "slope", "run.duration": 1e-3}, "run.settle = 0.0005 s leaves less than"),
         ({"run.settle": 0.2 - 1e-12}, "must be below run.duration"),
     ],
 )
 def test_averages_need_something_to_average(settings: dict[str, Any], said: str) -> None:
     with pytest.raises(BadInput, match=said):
         load("paper-limited", {"run.duration": 0.2, **settings})
+
+
+def test_a_short_run_may_average_by_the_slope() -> None:
+    scene = load("paper-limited", {"run.duration": 0.5, "run.average": "slope"})
+    assert scene.run.settle == load("paper-limited", {"run.duration": 0.5}).run.settle
 
 
 def test_a_motion_from_a_file_is_averaged_over_all_of_it(tmp_path: Path) -> None:

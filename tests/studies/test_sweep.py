@@ -386,6 +386,22 @@ def test_a_sweep_of_ones_own_circuit_over_two_keys_is_a_map_and_a_range() -> Non
     assert np.nan_to_num(colours.astype(float)).tolist() == np.nan_to_num(speed).tolist()
 
 
+@pytest.mark.parametrize(("least", "told"), [(-1e-3, True), (0.0, True), (1e-4, False)])
+def test_a_map_tells_what_its_black_lines_are(least: float, told: bool) -> None:
+    keys = {"a": [1.0, 2.0], "b": [1.0, 2.0]}
+    data = xr.Dataset(
+        {
+            "v_average": (tuple(keys), [[least, 3e-3], [2e-3, 4e-3]], {"units": "m/s"}),
+            "failure": (tuple(keys), [["", ""], ["", ""]]),
+        },
+        {name: (name, at, {"key": f"t.{name}", "units": "?"}) for name, at in keys.items()},
+        {"title": "map"},
+    )
+    drawn = figure.draw(data, "map")
+    assert ("black lines: ±0.05 mm/s" in drawn.get_suptitle()) == told
+    assert (len(drawn.axes[0].collections) > 1) == told
+
+
 def test_a_kill_leaves_no_older_figure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Between the numbers and the figure of another sweep, whose journal is gone."""
     (tmp_path / "figure.png").write_bytes(b"old")

@@ -63,8 +63,9 @@ def draw(data: xr.Dataset, title: str) -> Picture:
         figure = _maps(shown, y, x, quantities)
         if fixed:
             words += f"; drawn at {', '.join(_setting(shown[key]) for key in fixed)}, the best"
-        if (np.abs(_values(shown, V_AVERAGE)) < STAYS * V_AVERAGE.scale).any():
-            words += f"; dashes: the part stays (below {STAYS * 1e3:g} mm/s)"
+        v, most = _values(shown, V_AVERAGE), STAYS * V_AVERAGE.scale
+        if (v < most).any() and (v > -most).any():
+            words += f"; black lines: ±{most:g} mm/s, within which the part stays (dashes)"
     if of_ports(data):
         said = range_of(data, quantities[0].name, 4) or "all failed"
         headline(figure, f"{title}: {quantities[0].name} {said}\n{words}".replace("$", "\\$"))

@@ -107,7 +107,7 @@ def _judgement(data: xr.Dataset) -> list[str]:
         f"{np.median(error) * 100:.2g} %, beyond {BEYOND * 100:g} % at "
         f"{(error > BEYOND).mean() * 100:.3g} % of them (of v_average, at least {LEAST * 1e3:g} "
         "mm/s)",
-        f"  furthest off {error.max() * 100:.2g} % at {at(data, worst)}",
+        f"  furthest off {float(f'{error.max() * 100:.2g}'):g} % at {at(data, worst)}",
     ]
 
 
