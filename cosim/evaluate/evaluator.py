@@ -164,6 +164,6 @@ def workers_asked(workers: int | None) -> int:
     """The number of workers: those asked for, or one for each processor. Raises BadInput."""
     if workers is None:
         return processors()
-    if not 1 <= workers <= 1024:
+    if workers not in range(1, 1025):
         raise BadInput(f"--workers {workers}: must be a whole number from 1 to 1024.")
     return workers

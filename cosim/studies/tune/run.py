@@ -119,7 +119,7 @@ def tune(
         changes, shape = family(name) if asked else ({}, {})
         families[name] = changed(scene, changes, "--waveform"), {**keys, **both, **shape}
     least = FEWEST_RUNS + 2 * max(len(ranges) for _, ranges in families.values())
-    if not least <= budget <= MOST_RUNS:
+    if budget not in range(least, MOST_RUNS + 1):  # 26.5 is not, either
         raise BadInput(
             f"--budget {budget}: must be a whole number from {least}, for these keys, to "
             f"{MOST_RUNS}."
