@@ -54,9 +54,8 @@ def hints(recording: Recording, observe: Observe, guide: str, starts: Array) -> 
 
     if {"z_surface", "v_surface", "z_part", "v_part"} <= signals.keys():
         before, after = heights("surface", "part"), heights("part", "surface")
-        if _better(after, before):
-            agree = _agree("two heights", after, before)
-            yield f"{agree} with the columns of surface and part exchanged: which is which?"
+        if hint := _hint("two heights", after, before):
+            yield f"{hint} with the columns of surface and part exchanged: which is which?"
             return
     start, fine = starts[0], True  # ``fine``: no guess has explained the misfit yet
     measured = {name: signals[name] for name in (guide, *R2) if name in signals}
@@ -70,11 +69,11 @@ def hints(recording: Recording, observe: Observe, guide: str, starts: Array) -> 
         runs = laid if velocity == guide else [observe(recording, velocity, start)]
         shares = {factor: [explained(run, factor * values) for run in runs] for factor in FACTORS}
         factor = max(shares, key=lambda factor: max(shares[factor]))
-        before, after = max(shares[1.0]), max(shares[factor])
-        if factor != 1.0 and _better(after, before):
+        hint = _hint(COLUMNS[name].text, max(shares[factor]), max(shares[1.0]))
+        if factor != 1.0 and hint:
             fine = False
             start = starts[int(np.argmax(shares[factor]))] if name == guide else start
-            yield _agree(COLUMNS[name].text, after, before) + _scaled(recording, name, factor)
+            yield hint + _scaled(recording, name, factor)
     for sentence in _of_other_motion(recording, observe, laid, guide, start) if fine else ():
         fine = False
         yield sentence
@@ -87,9 +86,9 @@ def hints(recording: Recording, observe: Observe, guide: str, starts: Array) -> 
             runs = (observe(timed, guide, first) for first in near)
             clocks[clock] = max(explained(run, signals[guide]) for run in runs)
         clock = max(clocks, key=lambda clock: clocks[clock])
-        if _better(clocks[clock], clocks[1.0]) and clocks[clock] - clocks[1.0] > 0.02:
-            agree = _agree(COLUMNS[guide].text, clocks[clock], clocks[1.0])
-            yield f"{agree} with times multiplied by {clock:.3f}: is its frame rate right?"
+        hint = _hint(COLUMNS[guide].text, clocks[clock], clocks[1.0])
+        if hint and clocks[clock] - clocks[1.0] > 0.02:
+            yield f"{hint} with times multiplied by {clock:.3f}: is its frame rate right?"
 
 
 def _of_other_motion(
@@ -105,10 +104,8 @@ def _of_other_motion(
         runs = laid if v == guide else [observe(recording, v, start)]
         before = max(explained(run, signals[v]) for run in runs)
         after = max(explained(run, signals[z]) for run in runs)
-        if _better(after, before):
-            header = plain(headers[z]["header"], 40)
-            agree = _agree(f"column {header}", after, before)
-            yield f"{agree} as a velocity, in {headers[z]['unit']}/s: is it one?"
+        if hint := _hint(f"column {plain(headers[z]['header'], 40)}", after, before):
+            yield f"{hint} as a velocity, in {headers[z]['unit']}/s: is it one?"
             return
     if not {"z_surface", "v_surface", "z_part", "v_part"} <= signals.keys():
         return
@@ -123,20 +120,16 @@ def _of_other_motion(
         words: explained(observe(recording, "v_part", start + lag * row), values)
         for words, (values, lag) in guesses.items()
     }
-    words, before = max(shares, key=lambda words: shares[words]), shares[as_it_is]
-    if _better(shares[words], before):
-        yield f"{_agree('height of the part', shares[words], before)} {words}"
+    words = max(shares, key=lambda words: shares[words])
+    if hint := _hint("height of the part", shares[words], shares[as_it_is]):
+        yield f"{hint} {words}"
 
 
-def _better(after: float, before: float) -> bool:
-    """Whether a guess raises R² enough: it halves the unexplained share and reaches WELL."""
-    return after >= WELL and 1.0 - after <= 0.5 * (1.0 - before)
-
-
-def _agree(what: str, after: float, before: float) -> str:
-    return (
-        f"Hint: the recording's {what} would agree much better (R² {after:.2f}, not {before:.2g})"
-    )
+def _hint(what: str, after: float, before: float) -> str:
+    """The begin of a hint if a guess halves the unexplained share of R² and reaches WELL, or ""."""
+    words = f"the recording's {what} would agree much better (R² {after:.2f}, not {before:.2g})"
+    better = after >= WELL and 1.0 - after <= 0.5 * (1.0 - before)
+    return f"Hint: {words}" if better else ""
 
 
 def _scaled(recording: Recording, name: str, factor: float) -> str:
