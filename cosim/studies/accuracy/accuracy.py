@@ -36,7 +36,6 @@ EQUAL_TIME, EQUAL_ERROR = 0.5, 1e-3
 CHAOTIC = 1e4
 """Growth of a small difference above which a scene is chaotic: single paths are not compared."""
 _HALVINGS = 4  # of the setting, over which an order is fitted
-STORE = "accuracy.sqlite"
 
 _ROUNDS = 3  # in which all runs are timed, for a median
 _COLORS = VERMILION, SKY, BLUE, GREEN, ORANGE, "black", PURPLE
@@ -175,7 +174,7 @@ def accuracy(
             progress(done, len(cases), case.title)
         return report(runs, solvers)
 
-    return reported(made, out, STORE, quick)
+    return reported(made, out, "accuracy.sqlite", quick)
 
 
 def report(runs: Sequence[Run], solvers: Sequence[Solver] = SOLVERS) -> Report:

@@ -26,8 +26,6 @@ from cosim.studies.study import check_seed
 UNSTEADY = 0.5
 """Scatter of a velocity's cycles (NRMSE) above which no periodic drive can explain the trial."""
 
-STORE = "identify.sqlite"
-
 
 class Identification(solved.Solved):
     """A finished identification."""
@@ -100,7 +98,7 @@ def identify(
         found = _identified(plans, steady, others)
         return replace(found, numbers={"seed": seed, "quick": quick} | found.numbers)
 
-    return reported(made, out, STORE, seed, *_asked(space, steady, effort))
+    return reported(made, out, "identify.sqlite", seed, *_asked(space, steady, effort))
 
 
 def _identified(

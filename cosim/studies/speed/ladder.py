@@ -25,8 +25,6 @@ RUNGS = ("ideal", "limited", "amplifier", "full")
 RUNS = [(model, k) for k in range(3) for model in RUNGS if not (k and model == "full")]
 """Runs of each scene, in order: model and repetition; three for the median cost, one of "full"."""
 
-STORE = "ladder.sqlite"
-
 
 @dataclass(frozen=True)
 class Rung:
@@ -132,7 +130,7 @@ def ladder(
     tick = counted(progress, len(RUNS) * len(loaded))
     return reported(
         lambda store: report([(scene, each_rung(scene, store, tick)) for scene in loaded]),
-        *(out, STORE, [scene.as_dict() for scene in loaded]),
+        *(out, "ladder.sqlite", [scene.as_dict() for scene in loaded]),
     )
 
 

@@ -155,8 +155,6 @@ def _amplifier(scene: Scene) -> tuple[float, float, float]:
     return circuit.sense_resistance, rate, 10.0 ** (circuit.open_loop_gain / 20.0)
 
 
-STORE = "stability.sqlite"
-
 _COLORS = {1: ORANGE, 2: BLUE, 3: GREEN}
 """Colours of the curves by the order of the method."""
 _MARKERS = "osD^v<>PX*hd"
@@ -276,7 +274,7 @@ def stability(
             progress(len(found), len(METHODS) * len(regimes), limit.method)
         return report(found)
 
-    return reported(made, out, STORE, quick)
+    return reported(made, out, "stability.sqlite", quick)
 
 
 def report(found: Sequence[Limit]) -> Report:

@@ -184,8 +184,8 @@ class Search:
         """Own parameters of rigs (n × trials × OWN), within bounds, fitted in one round; costs."""
         rigs = np.repeat(self.space.rigs(points), len(self.targets), axis=0)
         own = np.clip(own, self.bounds("low"), self.bounds("high"))
-        pairs = own.reshape(-1, 1, len(OWN))  # a row for each pair of rig and trial
-        found, costs = self._refined_each([*self.targets] * len(points), rigs, pairs, 1)
+        pairs = own.reshape(-1, len(OWN))  # a row for each pair of rig and trial
+        found, costs = refine([*self.targets] * len(points), rigs, pairs, 1, self.workers)
         return found.reshape(own.shape), costs.reshape(own.shape[:2])
 
     def rescreened(
