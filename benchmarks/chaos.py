@@ -128,7 +128,7 @@ _STATISTICS = {
 def draw(ensembles: Mapping[str, Ensemble], title: str) -> Picture:
     """Draw the values of each statistic by method: a tick for each run, and their mean."""
     note = "One tick a run; dot and bar: their mean with two standard errors."
-    figure, axes = panels(title, note, (11.0, 3.4), 1, len(_STATISTICS), sharey=True)
+    figure, axes = panels(title, note, (11.0, 3.4), len(_STATISTICS), sharey=True)
     for axis, (statistic, (label, scale)) in zip(axes, _STATISTICS.items(), strict=True):
         for place, found in enumerate(ensembles.values()):
             values = [scale * v for v in found[statistic]]

@@ -244,7 +244,7 @@ def draw(rows: Sequence[Row], title: str) -> Picture:
         "A line from coarse to fine steps; ring: default. Solid: the median; dotted: the worst. "
         f"What is less stands at {LEAST:g} %."
     )
-    figure, axes = panels(title, note, (11.0, 5.2), 1, 2, sharex=True, sharey=True)
+    figure, axes = panels(title, note, (11.0, 5.2), 2, sharex=True, sharey=True)
     lines = dict.fromkeys(row["line"] for row in rows)
     looks = zip((ORANGE, GREEN, BLUE, PURPLE, VERMILION), "osD^v", strict=True)
     styles = dict(zip(lines, looks, strict=True))

@@ -207,7 +207,7 @@ def _solved(law: Law, scene: Scene) -> tuple[float, float, int]:
 def draw(rows: Sequence[Row], title: str) -> Picture:
     """Draw the creep of a held part with each law, and the error in the whole machine."""
     note = "µm/s: width of the smoothed law; kN/m: stiffness of its bristle."
-    figure, axes = panels(title, note, (11.0, 4.2), 1, 2, sharey=True)
+    figure, axes = panels(title, note, (11.0, 4.2), 2, sharey=True)
     places = range(len(rows))
     laws = dict.fromkeys(row["law"] for row in rows)
     colors = dict(zip(laws, ("black", VERMILION, BLUE, GREEN), strict=True))

@@ -1,9 +1,12 @@
 """What the figures of the studies share: size, colours, titles and notes."""
 
 import re
+from collections.abc import Sequence
+from math import ceil
 from textwrap import fill
 from typing import Any
 
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 
@@ -37,21 +40,28 @@ def panels(
     title: str,
     note: str,
     size: tuple[float, float],
-    rows: int = 1,
-    columns: int = 1,
+    count: int = 1,
+    columns: int = 0,
     **options: Any,
 ) -> tuple[Picture, list[Axes]]:
-    """A figure of ``size`` (inches) and its axes row by row.
-
-    ``title`` is its message; ``note``, below, tells how to read it.
-    """
+    """A figure of ``size`` (inches) and the axes of its ``count`` panels row by row, in one row
+    without ``columns``. ``title`` is its message; ``note``, below, tells how to read it."""
     width, height = size
-    figure, axes = grid(rows * columns, columns, width, height / rows, 0.0, **options)
+    columns = columns or count
+    figure, axes = grid(count, columns, width, height / ceil(count / columns), 0.0, **options)
     headline(figure, title)
     footnote(figure, note)
     for axis in axes:
         axis.set_axisbelow(True)
     return figure, axes
+
+
+def legend(on: Picture | Axes, axes: Sequence[Axes], **style: Any) -> None:
+    """Add one legend without a frame, with each label of these axes once."""
+    named: dict[str, Artist] = {}
+    for axis in axes:
+        named |= dict(zip(*reversed(axis.get_legend_handles_labels()), strict=True))
+    on.legend(named.values(), named, frameon=False, **style)
 
 
 def keep_ticks_inside(*axes: Axis) -> None:

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from itertools import accumulate
-from math import exp, inf, isfinite, log, nan
+from math import ceil, exp, inf, isfinite, log, nan
 from textwrap import fill
 
 import numpy as np
@@ -27,6 +27,7 @@ from cosim.studies.plots import (
     PURPLE,
     SKY,
     VERMILION,
+    legend,
     panels,
 )
 from cosim.studies.report import Progress, Report, Row, brief, silent, span
@@ -210,19 +211,17 @@ def draw(runs: Sequence[Run], strong: Mapping[str, str], title: str) -> Picture:
     """Draw error over CPU time, a panel for each scene; ``strong`` are methods' names by label."""
     scenes = list(dict.fromkeys(run.scene for run in runs))
     wide = min(len(scenes), 2)
-    high = -(-len(scenes) // wide)
     note = (
         "Dots: runs of the other methods. ×: diverged; at the top edge: failed or in a false limit "
         "cycle."
     )
-    figure, axes = panels(title, note, (5.5 * wide, 4.0 * high + 0.5), high, wide)
+    size = (5.5 * wide, 4.0 * ceil(len(scenes) / wide) + 0.5)
+    figure, axes = panels(title, note, size, len(scenes), wide)
     for axis, scene in zip(axes, scenes, strict=True):
         _panel(axis, [run for run in runs if run.scene == scene], strong)
         axis.set_title(CASES[scene].title, fontsize=10.5, loc="left")
         axis.set(xlabel="CPU time [s]", ylabel="error / range")
-    named = {line.get_label(): line for axis in axes for line in axis.lines}
-    shown = [line for label, line in named.items() if not str(label).startswith("_")]
-    figure.legend(handles=shown, loc="outside right center", frameon=False, fontsize=9)
+    legend(figure, axes, loc="outside right center", fontsize=9)
     return figure
 
 

@@ -112,7 +112,7 @@ def draw(rows: Sequence[Row]) -> Picture:
         message(rows),
         "Bars: simulated by the whole chain. Marks: what the measurements give for comparison.",
         (12.0, 4.6),
-        columns=3,
+        3,
     )
     at, speed = range(len(rows)), "Part's mean velocity [mm/s]"
     first, centred, line, from_first = ([*COLUMNS][k] for k in (0, 4, 5, 6))

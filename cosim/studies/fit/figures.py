@@ -8,6 +8,7 @@ from cosim.files.picture import Picture, grid
 from cosim.studies.fit.forces import Force
 from cosim.studies.fit.results import Shown, headline
 from cosim.studies.fit.search import LOSS
+from cosim.studies.plots import legend
 
 SURFACE, MEASURED, SIMULATED = "#8fb8da", "0.15", "#d1495b"
 DASHED = (0, (4, 1.2))
@@ -38,8 +39,7 @@ def trials(shown: Sequence[Shown], result: dict[str, Any]) -> Picture:
         axis.set_title(f"{one.name}: {title}", loc="left", fontsize=10)
     for axis in axes[-columns:]:
         axis.set_xlabel("time [ms]")
-    handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
+    legend(figure, axes[:1], loc="outside lower center", ncols=3)
     if fitted:
         title = headline(result)
     else:
@@ -111,8 +111,7 @@ def forces(known: Sequence[Force], result: dict[str, Any]) -> Picture:
     axis.set_xlim(-0.5, len(rows) - 0.5)
     axis.set_ylim(0, None)
     axis.set(xlabel="trial", ylabel="normal force [m·g]")
-    each = dict(zip(*reversed(axis.get_legend_handles_labels()), strict=True))  # by its label
-    axis.legend(each.values(), each, fontsize=9, frameon=False, loc="upper center", ncols=3)
+    legend(axis, [axis], fontsize=9, loc="upper center", ncols=3)
     change = result["normal_force_change_mean_percent"]
     off = "" if change is None else f"; {change:.1f} % off the measured on average"
     axis.set_title(f"Normal forces, {_words(result)}{off}", fontsize=10)

@@ -190,7 +190,7 @@ def draw(rows: Sequence[Row], title: str) -> Picture:
         "Bars: expected width of the 90 % interval of the robust v_up after one measurement, ± "
         "standard error. Solid line: now; dotted: after one that tells nothing."
     )
-    figure, axes = panels(f"{title}.", note, (11.0, 5.2), 1, len(TARGETS), sharey=True)
+    figure, axes = panels(f"{title}.", note, (11.0, 5.2), len(TARGETS), sharey=True)
     now, luck, *after = rows
     for axis, target, color in zip(axes, TARGETS, (BLUE, ORANGE), strict=True):
         names = [row["measurement"] for row in after]

@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from math import nan
+from math import ceil, nan
 from statistics import median
 from typing import Any
 
@@ -172,18 +172,17 @@ def words(scene: Scene, rungs: list[Rung]) -> str:
 def draw(found: Found) -> Picture:
     """Draw error over cost, a panel a scene, and mark the cheapest rung within the tolerance."""
     wide = 2 if len(found) == 4 else min(len(found), 3)
-    high = -(-len(found) // wide)  # rows of panels, rounded up
     errors = [rung.off_top for _, rungs in found for rung in rungs]
     top = 200.0 * max(*errors, *(scene.run.tolerance for scene, _ in found))
     costs = [rung.cost[0] for _, rungs in found for rung in rungs]
     ends = min(costs) / 6.0, max(costs) * 6.0  # with room for the rungs' names
-    size = (max(3.8 * wide, 6.0), 3.4 * high + 0.6)
+    size = (max(3.8 * wide, 6.0), 3.4 * ceil(len(found) / wide) + 0.6)
     note = (
         "Green: the cheapest rung within run.tolerance, which is shaded. Under a sawtooth “full” "
         "has the firmware's staircase, the others the smooth ramp."
     )
-    figure, axes = panels(message(found), note, size, high, wide, sharex=True, sharey=True)
-    for axis, (scene, rungs) in zip(axes, found, strict=False):
+    figure, axes = panels(message(found), note, size, len(found), wide, sharex=True, sharey=True)
+    for axis, (scene, rungs) in zip(axes, found, strict=True):
         tolerance, taken = scene.run.tolerance, cheapest(rungs, scene.run.tolerance)
         axis.axhspan(0.0, 100.0 * tolerance, color=GREEN, alpha=0.12, lw=0)
         for rung in rungs:
@@ -198,8 +197,6 @@ def draw(found: Found) -> Picture:
         axis.set_yscale("symlog", linthresh=0.1)
         axis.set(xlabel="computing per simulated second [s]", xlim=ends, ylim=(-0.03, top))
         axis.tick_params(labelbottom=True)
-    for axis in axes[len(found) :]:
-        axis.set_visible(False)
     for axis in axes[::wide]:
         axis.set_ylabel("error of v_average against “full” [%]")
     return figure

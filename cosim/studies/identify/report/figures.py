@@ -1,10 +1,8 @@
 """The figures of an identification."""
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from cosim.files.picture import Picture, grid
@@ -12,7 +10,7 @@ from cosim.scene import keys
 from cosim.studies.identify.problem.space import OF_LAWS
 from cosim.studies.identify.report.solved import KINDS, Solved, shown
 from cosim.studies.identify.report.verdicts import TRUSTED, forces
-from cosim.studies.plots import headline
+from cosim.studies.plots import headline, legend
 from cosim.studies.report import Row
 from cosim.waveforms.columns import COLUMNS
 from cosim.waveforms.quantities import label as labelled
@@ -61,19 +59,13 @@ def overlays(found: Solved) -> Picture:
             axis.set_title(what, loc="left", fontsize=9)
     for axis in axes[-3:]:
         axis.set_xlabel("time [ms]")
-    _legend(figure, axes[0], "outside upper right", 2)
+    legend(figure, axes[:1], loc="outside upper right", ncols=2)
     told = [1.0 - rows[trial.label][VELOCITY] ** 2 for trial in found.trials]
     whole = (
         f"{percent(min(told))} to {percent(max(told))}" if len(told) > 1 else f"{percent(told[0])}"
     )
     headline(figure, f"One rig explains {whole} of the variance of the surface's velocity")
     return figure
-
-
-def _legend(figure: Picture, axis: Axes, place: Any, columns: int) -> None:
-    """Add one legend for all panels, with each label of ``axis`` once."""
-    names = dict(zip(*reversed(axis.get_legend_handles_labels()), strict=True))
-    figure.legend([*names.values()], [*names], loc=place, ncols=columns, frameon=False)
 
 
 def errors(found: Solved) -> Picture:
@@ -99,7 +91,7 @@ def errors(found: Solved) -> Picture:
         axis.set_title(title, loc="left", fontsize=10.5)
         axis.grid(visible=False, axis="x")
         axis.set_xlabel("trial")
-    _legend(figure, axes[0], "outside lower center", 4)
+    legend(figure, axes[:1], loc="outside lower center", ncols=4)
     message = f"The surface's velocity is {numbers['overall'][VELOCITY]:.2f} off (NRMSE)"
     if held:
         apart = numbers["held_out_overall"][KINDS[0]][VELOCITY]
@@ -149,7 +141,7 @@ def rigs(found: Solved) -> Picture:
         axis.set_title(f"{named}: cost", loc="left", fontsize=9)
     for axis in (first, *others):
         axis.tick_params(labelsize=7)
-    _legend(figure, first, "outside upper right", 3)
+    legend(figure, [first], loc="outside upper right", ncols=3)
     known = sum(verdict.kind == "identified" for verdict in found.verdicts)
     message = (
         f"The trials tell {known} of {len(names)} keys within {percent(TRUSTED)}; shaded: ranges"
@@ -177,7 +169,7 @@ def spectrum(found: Solved) -> Picture:
         axis.set_ylim(1e-4, 1.5)
         axis.grid(visible=False, axis="x")
         axis.set_title(f"Trial {name}", loc="left", fontsize=9.5)
-    _legend(figure, axes[0], "outside upper right", 2)
+    legend(figure, axes[:1], loc="outside upper right", ncols=2)
     missed: dict[str, float] = {}
     for row in found.numbers["bands"]:
         band = f"{row['from_hz']:.0f} to {row['to_hz']:.0f} Hz"
