@@ -13,6 +13,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from cosim.coupling.polynomials import Array, Signal, slope, value
+from cosim.scene import Scene
 
 _REMEMBERED = 64  # propagators in the cache; variable macro steps use each only a few times
 
@@ -96,27 +97,20 @@ def coil(resistance: float, inductance: float, current: float = 0.0) -> LinearPa
 
 
 def regulated_coil(
-    resistance: float,
-    inductance: float,
-    sense_resistance: float,
-    gain_bandwidth: float,
-    open_loop_gain: float,
-    current: float = 0.0,
-    sine: tuple[float, float] | None = None,
+    scene: Scene, current: float = 0.0, sine: tuple[float, float] | None = None
 ) -> LinearParticipant:
-    """A coil in the feedback of an amplifier with one pole; input back-EMF, output current.
+    """A scene's coil in the feedback of its amplifier with one pole, which never saturates; input
+    back-EMF, output current.
 
-    ``gain_bandwidth`` in Hz, ``open_loop_gain`` a plain number. The states are the current and the
-    amplifier's output voltage. The command is constant (then states are deviations from the
-    equilibrium), or A sin(2π f t) with ``sine`` = (A, f) in V and Hz, whose A sin and A cos are two
-    more states.
+    The states are the current, A, at first ``current``, and the amplifier's output voltage. The
+    command is constant (then states are deviations from the equilibrium), or A sin(2π f t) with
+    ``sine`` = (A, f) in V and Hz, whose A sin and A cos are two more states.
     """
-    rate = 2.0 * np.pi * gain_bandwidth
-    loop = resistance + sense_resistance
-    a = [
-        [-loop / inductance, 1.0 / inductance],
-        [-rate * sense_resistance, -rate / open_loop_gain],
-    ]
+    circuit, inductance = scene.circuit, scene.coil.inductance
+    sense, rate = circuit.sense_resistance * scene.coil.count, 2.0 * np.pi * circuit.gain_bandwidth
+    leak = rate / 10.0 ** (circuit.open_loop_gain / 20.0)
+    loop = scene.coil.resistance + sense
+    a = [[-loop / inductance, 1.0 / inductance], [-rate * sense, -leak]]
     b, c = [[-1.0 / inductance], [0.0]], [[1.0, 0.0]]
     if sine is None:
         return LinearParticipant(a, b, c, state=[current, 0.0])

@@ -105,17 +105,9 @@ def reference(name: str) -> Reference:
 
 def participants(scene: Scene) -> tuple[LinearParticipant | Amplifier, FmuMechanics]:
     """The circuit ``amplifier`` and the mechanics of a scene, at rest; both can repeat a step."""
-    circuit, coil, drive = scene.circuit, scene.coil, scene.drive
-    mechanics = FmuMechanics(scene)
+    drive, mechanics = scene.drive, FmuMechanics(scene)
     if drive.waveform == "sine" and drive.offset == 0.0:
         # ``Amplifier`` needs a command of straight lines; for a sine the linear circuit is exact.
-        side = regulated_coil(
-            coil.resistance,
-            coil.inductance,
-            circuit.sense_resistance * coil.count,
-            circuit.gain_bandwidth,
-            10.0 ** (circuit.open_loop_gain / 20.0),
-            sine=(0.5 * drive.amplitude, drive.frequency),
-        )
-        return side, mechanics
+        sine = (0.5 * drive.amplitude, drive.frequency)
+        return regulated_coil(scene, sine=sine), mechanics
     return Amplifier(scene, command(scene)), mechanics

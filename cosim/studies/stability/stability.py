@@ -127,7 +127,8 @@ def linear_sides(regime: Regime) -> tuple[LinearParticipant, LinearParticipant]:
         mechanics = LinearParticipant(a, [[x] for x in b], [[0.0, bl, 0.0, 0.0]])
         return circuit_of(regime), mechanics
     # Circuit: current in, coil's voltage out; the sense resistor is on its side.
-    sense, rate, gain = _amplifier(scene)
+    sense, rate = scene.circuit.sense_resistance, 2.0 * pi * scene.circuit.gain_bandwidth
+    gain = 10.0 ** (scene.circuit.open_loop_gain / 20.0)
     leak, driven = (0.0, 0.0) if regime.output == "saturated" else (-rate / gain, -rate * sense)
     circuit = LinearParticipant([[leak]], [[driven]], [[1.0]], [[-sense]], state=[0.0])
     # Mechanics: voltage in, current out, which is the fifth state.
@@ -141,18 +142,10 @@ def linear_sides(regime: Regime) -> tuple[LinearParticipant, LinearParticipant]:
 def circuit_of(regime: Regime) -> LinearParticipant:
     """The circuit with the coil in it, at an initial current of 1 mA."""
     scene = regime.machine.scene
-    resistance, inductance = scene.coil.resistance, scene.coil.inductance
-    sense, rate, gain = _amplifier(scene)
-    if regime.output == "saturated":
-        return coil(resistance + sense, inductance, 1e-3)
-    return regulated_coil(resistance, inductance, sense, rate / (2.0 * pi), gain, 1e-3)
-
-
-def _amplifier(scene: Scene) -> tuple[float, float, float]:
-    """Sense resistance (Ω), gain-bandwidth (rad/s), open-loop gain (a plain number)."""
-    circuit = scene.circuit
-    rate = 2.0 * pi * circuit.gain_bandwidth
-    return circuit.sense_resistance, rate, 10.0 ** (circuit.open_loop_gain / 20.0)
+    if regime.output == "regulated":
+        return regulated_coil(scene, 1e-3)
+    around = scene.coil.resistance + scene.circuit.sense_resistance
+    return coil(around, scene.coil.inductance, 1e-3)
 
 
 _COLORS = {1: ORANGE, 2: BLUE, 3: GREEN}
