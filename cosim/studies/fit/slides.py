@@ -11,7 +11,7 @@ Where part and surface move together the acceleration is a random walk, as in a 
 source: G. Wahba, *Spline Models for Observational Data*, SIAM 1990, chapter 1. Units: s, m.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise, product
 
 import numpy as np
@@ -132,8 +132,7 @@ class Slide:
     def only(self, pairs: npt.NDArray[np.bool_]) -> "Slide":
         """This slide restricted to some of its pairs of instants."""
         names = ("begin", "end", "whiten", "fixed", "level")
-        chosen = {name: getattr(self, name)[pairs] for name in names}
-        return Slide(self.sign, self.time, self.z, self.v_plate, **chosen)
+        return replace(self, **{name: getattr(self, name)[pairs] for name in names})
 
 
 def _accelerations(

@@ -11,7 +11,7 @@ from cosim.scene import Scene, keys, load
 from cosim.scene.model import toml_value
 from cosim.simulation.simulate import simulate
 from cosim.studies.identify.problem.targets import Measured, own_parameters
-from cosim.trials.camera import hermite
+from cosim.trials.camera import heights
 
 Settings = dict[str, float | str]
 
@@ -84,10 +84,9 @@ def exact(settings: Settings, first: float, time: np.ndarray) -> dict[str, Any]:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", Note)
                 made = scene(settings | {"run.duration": first + float(time[-1]) + 1e-3}, circuit)
-                waves = simulate(made).waveforms
+                waves = simulate(made).columns
         except (BadInput, SimulationFailed) as error:
             found |= {circuit: None, f"{circuit}_failure": str(error)}
             continue
-        z = hermite(time + first, *(waves[name].values for name in ("time", "z_part", "v_part")))
-        found[circuit] = slope(time, z) * 1e3
+        found[circuit] = slope(time, heights(waves, "part", time + first, 0.0)) * 1e3
     return found
