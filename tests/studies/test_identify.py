@@ -363,7 +363,8 @@ def test_a_store_of_another_build_is_not_taken(
 def made_up(space: Space, place: Array, cost: float, amplitude: float = 7.0) -> Found:
     own = np.tile(np.array(OWN["1"]), (2, 1))
     own[:, 0] = amplitude
-    return Found(space, place, own, np.full(2, cost), cost)
+    alike = Found(space, place, own, np.ones(2))
+    return replace(alike, costs=alike.costs * cost / alike.total)  # whatever the priors say
 
 
 def test_verdicts() -> None:
@@ -449,7 +450,7 @@ def test_effective_samples_count_what_is_new(folder: Path) -> None:
     (trial,) = [one for one in read_trials(folder, space) if one.label == "5"]
     rig, own = space.rigs(point()[None])[0], np.array(OWN["5"])
     exact, rng, found = shown(trial, rig, own)["v_surface"], np.random.default_rng(0), {}
-    whole = Found(space, point(), own[None], np.zeros(1), 0.0)
+    whole = Found(space, point(), own[None], np.zeros(1))
     for a in (0.0, 0.7):
         counts = []
         for _ in range(20):

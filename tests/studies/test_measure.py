@@ -18,7 +18,7 @@ from cosim.simulation.simulate import simulate
 from cosim.studies.identify.problem.gauges import AT_WALL, GAUGES
 from cosim.studies.identify.problem.space import Space, read_space
 from cosim.studies.identify.problem.targets import read_trials
-from cosim.studies.identify.search.search import SAMPLES, Found, Search, finish
+from cosim.studies.identify.search.search import SAMPLES, Found, Search, finish, totals
 from cosim.studies.limits.study import ensemble
 from cosim.studies.measure import measure as study
 from cosim.studies.measure import sample as sampling
@@ -168,8 +168,9 @@ def test_a_measurement_weighs_as_in_a_likelihood(tmp_path: Path) -> None:
     priors = [np.log(value / entry.prior) / entry.sigma for value in (1.3, 1.5)]
     assert off[:, 2] == pytest.approx(priors)
     costs = np.full((2, 9), 0.1)
-    totals = Search(space, [], 1).totals(costs, points)
-    assert 9.0 * SAMPLES * (totals / 0.1 - 1.0) == pytest.approx((off**2).sum(axis=1))
+    assert 9.0 * SAMPLES * (totals(space, costs, points) / 0.1 - 1.0) == pytest.approx(
+        (off**2).sum(axis=1)
+    )
 
 
 @pytest.mark.usefixtures("folder")

@@ -88,15 +88,10 @@ class Plan:
         name = f"{self.name}: {name}"
         rng = np.random.default_rng([self.seed, crc32(name.encode())])
 
-        def plain() -> list[Any]:  # lists and numbers, which the store can hold
-            arrays = [((one.point, one.own, one.costs), one.total) for one in work(rng)]
-            return [[[array.tolist() for array in each], total] for each, total in arrays]
+        def plain() -> list[Any]:  # lists, which the store can hold
+            return [[x.tolist() for x in (one.point, one.own, one.costs)] for one in work(rng)]
 
-        found = []
-        for arrays, total in self.once(name, plain):
-            point, own, costs = (np.array(array, np.float64) for array in arrays)
-            found.append(Found(self.coarse.space, point, own, costs, total))
-        return found
+        return [Found(self.coarse.space, *map(np.array, each)) for each in self.once(name, plain)]
 
     def singles(self) -> list[Found]:
         """Rigs that fit one trial each, ``effort.singles`` of each."""

@@ -11,6 +11,7 @@ squares over rig and own parameters together ends the search (`finish`).
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -50,13 +51,17 @@ ENDS_AT = 1e-5
 @dataclass(frozen=True, eq=False)
 class Found:
     """A solution: a rig, as a ``point`` of its ``space``, with each trial's parameters ``own``
-    (trials × OWN) and ``costs`` (trials). ``total`` is the cost of all, :meth:`Search.totals`."""
+    (trials × OWN) and ``costs`` (trials)."""
 
     space: Space
     point: Array
     own: Array
     costs: Array
-    total: float
+
+    @cached_property
+    def total(self) -> float:
+        """The cost of all trials together, :func:`totals`."""
+        return float(totals(self.space, self.costs[None], self.point[None])[0])
 
     @property
     def rig(self) -> Array:
@@ -76,6 +81,16 @@ class Found:
 
 Progress = Callable[[str, float], None]
 """What is being done, and the best cost so far."""
+
+
+def totals(space: Space, costs: Array, points: Array) -> Array:
+    """Costs (n) of rigs at points (n × free) whose trials have ``costs`` (n × trials).
+
+    -2 ln L is the effective samples times ln cost. A measurement beside the trials, or a prior,
+    adds the square of its residual r, in standard deviations. To first order that multiplies the
+    mean cost by 1 + Σ r²/(effective samples)."""
+    off = (space.residuals(points) ** 2).sum(axis=1) / (SAMPLES * costs.shape[1])
+    return costs.mean(axis=1) * (1.0 + off)
 
 
 def best_of(several: Sequence[Found]) -> Found:
@@ -132,24 +147,10 @@ class Search:
         """``low``, ``high`` or ``scale`` of all targets (trials × OWN)."""
         return np.array([getattr(target, name) for target in self.targets])
 
-    def made(self, point: Array, own: Array, costs: Array) -> Found:
-        """A solution whose costs are known."""
-        total = float(self.totals(costs[None], point[None])[0])
-        return Found(self.space, point.copy(), own.copy(), costs.copy(), total)
-
-    def totals(self, costs: Array, points: Array) -> Array:
-        """Costs (n) of rigs at points (n × free) whose trials have ``costs`` (n × trials).
-
-        -2 ln L is the effective samples times ln cost. A measurement beside the trials, or a prior,
-        adds the square of its residual r, in standard deviations. To first order that multiplies
-        the mean cost by 1 + Σ r²/(effective samples)."""
-        off = (self.space.residuals(points) ** 2).sum(axis=1) / (SAMPLES * costs.shape[1])
-        return costs.mean(axis=1) * (1.0 + off)
-
     def refined(self, point: Array, own: Array, rounds: int) -> Found:
         """The solution on a given rig, its own parameters fitted from ``own`` on."""
         rigs = np.repeat(self.space.rigs(point[None]), len(self.targets), axis=0)
-        return self.made(point, *refine(self.targets, rigs, own, rounds, self.workers))
+        return Found(self.space, point, *refine(self.targets, rigs, own, rounds, self.workers))
 
     def screen(
         self, points: Array, rng: np.random.Generator, count: int, kept: int, rounds: int
@@ -168,7 +169,7 @@ class Search:
         own, cost = _best(*self._refined_each(each, rigs, own, rounds), 1)
         shape = (len(points), trials)
         solutions = zip(points, own.reshape(*shape, len(OWN)), cost.reshape(shape), strict=True)
-        return [self.made(*solution) for solution in solutions]
+        return [Found(self.space, *solution) for solution in solutions]
 
     def _refined_each(
         self, targets: Sequence[Target], rigs: Array, own: Array, rounds: int
@@ -196,7 +197,7 @@ class Search:
         refined = self.refined(found.point, found.own, rounds)
         take = drawn.costs < BETTER * refined.costs
         own = np.where(take[:, None], drawn.own, refined.own)
-        return self.made(found.point, own, np.where(take, drawn.costs, refined.costs))
+        return Found(self.space, found.point, own, np.where(take, drawn.costs, refined.costs))
 
     def borrowed(self, found: Found, others: Sequence[Found]) -> Found:
         """The solution on the same rig, with another solution's own parameters for each trial which
@@ -212,7 +213,7 @@ class Search:
         tried = np.clip(tried, self.bounds("low"), self.bounds("high")).transpose(1, 0, 2)
         rig = np.repeat(rigs[:1], len(self.targets), axis=0)
         own, cost = _best(*self._refined_each(self.targets, rig, tried, 3), 1)
-        return self.made(found.point, own[:, 0], cost[:, 0])
+        return Found(self.space, found.point, own[:, 0], cost[:, 0])
 
     def slopes(self, point: Array, own: Array, k: int) -> Array:
         """Derivatives of the residuals of trial ``k`` (columns) by the rig's d coordinates, then by
@@ -283,12 +284,12 @@ class Search:
             points = np.array(asked)
             begun = _inherited(points, parents, parents_own, follow)
             own, costs = self._refined_once(points, begun)
-            totals = self.totals(costs, points)
-            search.tell([*zip(asked, totals.tolist(), strict=True)])
-            k = int(totals.argmin())
-            leader = self.made(points[k], own[k], costs[k])
+            whole = totals(self.space, costs, points)
+            search.tell([*zip(asked, whole.tolist(), strict=True)])
+            k = int(whole.argmin())
+            leader = Found(self.space, points[k], own[k], costs[k])
             # The better half, from which CMA-ES moves its mean, are the next generation's parents.
-            good = np.argsort(totals)[: POPULATION // 2]
+            good = np.argsort(whole)[: POPULATION // 2]
             parents, parents_own = points[good], own[good]
             if generation % RESCREEN == 0:
                 leader = self.rescreened(leader, rng, *RESCREENED)
@@ -337,7 +338,7 @@ def deviations(search: Search, found: Found, samples: float) -> Array:
 
 def _weight(found: Found) -> float:
     """The factor w on residuals r of measurements beside the trials and of priors, with which
-    Σ cost + w² Σ r² is proportional to ``Search.totals``."""
+    Σ cost + w² Σ r² is proportional to ``totals``."""
     return float(np.sqrt(found.costs.mean() / SAMPLES))
 
 
