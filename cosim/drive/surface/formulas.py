@@ -217,6 +217,25 @@ def optimal_force_ratio(mu_s: float, mu_k: float, a_max: float, gravity: float =
     return min(cubic, largest_force_ratio(mu_s, a_max, gravity))
 
 
+def force_limits(case: Transport, a_max: float) -> dict[str, float]:
+    """The limits of F_n/(m_P g) and its optimum, and v_ave there in m/s and over g T, with
+    ``a_max``, m/s², in place of the case's."""
+    mu_s, mu_k, gravity = case.mu_s, case.mu_k, case.gravity
+    best = optimal_force_ratio(mu_s, mu_k, a_max, gravity)
+    pair = horizontal_equivalent(mu_s, mu_k, best)
+    velocity = horizontal_velocity(*pair, a_max, case.period, gravity)
+    return {
+        "a_max": a_max,
+        "f_min": least_force_ratio(mu_s),
+        "f_optimal": best,
+        "f_cubic": cubic_force_ratio(mu_s, mu_k, a_max, gravity),
+        "f_max_sticking": largest_force_ratio(mu_s, a_max, gravity),
+        "f_max_sliding": largest_force_ratio(mu_k, a_max, gravity),
+        "v_at_optimal": velocity,
+        "v_at_optimal_over_gT": velocity / (gravity * case.period),
+    }
+
+
 def _friction(mu_s: float, mu_k: float) -> None:
     positive(mu_s=mu_s, mu_k=mu_k)
     if mu_k > mu_s:

@@ -114,14 +114,8 @@ def optima(case: Transport, most: float) -> tuple[Array, Array]:
     """The line of optima: the best f_n and its v_ave, m/s, for each a_max up to ``most``, m/s²."""
     least = formulas.least_peak_acceleration_at_any_force(case.gravity)
     peaks = np.linspace(least * (1 + 1e-6), most, POINTS)
-    mu_s, mu_k, period, gravity = case.mu_s, case.mu_k, case.period, case.gravity
-    ratios = [formulas.optimal_force_ratio(mu_s, mu_k, float(peak), gravity) for peak in peaks]
-    speeds = [
-        formulas.horizontal_velocity(
-            *formulas.horizontal_equivalent(mu_s, mu_k, ratio), float(peak), period, gravity
-        )
-        for ratio, peak in zip(ratios, peaks, strict=True)
-    ]
+    found = [formulas.force_limits(case, float(peak)) for peak in peaks]
+    ratios, speeds = ([row[of] for row in found] for of in ("f_optimal", "v_at_optimal"))
     return np.array(ratios), np.array(speeds)
 
 

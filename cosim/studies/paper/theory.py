@@ -131,8 +131,8 @@ def collect(case: Transport) -> dict[str, Any]:
         "up_quaid": _cycle(quaid, quaid_velocity(case), gravity),
         "down": possible("down", False),
         "down_robust": possible("down", True),
-        "normal_force": _force(case, case.a_max),
-        "figure4": [_force(case, peak) for peak in peaks if peak > least],
+        "normal_force": formulas.force_limits(case, case.a_max),
+        "figure4": [formulas.force_limits(case, peak) for peak in peaks if peak > least],
     }
 
 
@@ -154,22 +154,4 @@ def _cycle(cycle: Cycle, velocity: float, gravity: float) -> dict[str, Any]:
         "accelerations": list(cycle.accelerations),
         "knot_times": times.tolist(),
         "knot_velocities": velocities.tolist(),
-    }
-
-
-def _force(case: Transport, a_max: float) -> dict[str, float]:
-    """The limits of the normal force and its optimum, with ``a_max`` in place of the case's."""
-    mu_s, mu_k, gravity = case.mu_s, case.mu_k, case.gravity
-    best = formulas.optimal_force_ratio(mu_s, mu_k, a_max, gravity)
-    pair = formulas.horizontal_equivalent(mu_s, mu_k, best)
-    velocity = formulas.horizontal_velocity(*pair, a_max, case.period, gravity)
-    return {
-        "a_max": a_max,
-        "f_min": formulas.least_force_ratio(mu_s),
-        "f_optimal": best,
-        "f_cubic": formulas.cubic_force_ratio(mu_s, mu_k, a_max, gravity),
-        "f_max_sticking": formulas.largest_force_ratio(mu_s, a_max, gravity),
-        "f_max_sliding": formulas.largest_force_ratio(mu_k, a_max, gravity),
-        "v_at_optimal": velocity,
-        "v_at_optimal_over_gT": velocity / (gravity * case.period),
     }
