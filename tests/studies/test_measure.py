@@ -211,12 +211,12 @@ def test_worth() -> None:
     targets = rng.standard_normal((n, 1))
     other, none = rng.standard_normal((n, 1)), np.empty((n, 0))
     own, useless, now = (
-        worth(v, np.full(v.shape, sd), targets, rng)[0]
+        worth(v, np.full(v.shape, sd), targets, rng)
         for v, sd in ((targets, 0.2), (other, 1e-3), (none, 1.0))
     )
     assert now.width == pytest.approx(2.0 * 1.645, rel=0.1)
     assert own.width == pytest.approx(now.width * 0.2 / sqrt(1.04), rel=0.2)
-    assert useless.width == pytest.approx(chance(targets, rng)[0].width, rel=0.05)
+    assert useless.width == pytest.approx(chance(targets, rng).width, rel=0.05)
     assert now.width < useless.width < 1.25 * now.width  # of fewer rigs: wider
     assert all(0.85 <= one.held <= 0.95 for one in (own, useless, now))
 

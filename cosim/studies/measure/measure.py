@@ -83,16 +83,16 @@ def measure(
     return reported(found, out, "measure.sqlite", inputs(base), others, seed, quick)
 
 
-def worths(found: Sample, seed: int) -> tuple[list[Worth], list[tuple[Candidate, list[Worth]]]]:
-    """For each of TARGETS the worth of no measurement, and that of each candidate, sorted by the
-    width that it leaves of the first target."""
+def worths(found: Sample, seed: int) -> tuple[Worth, list[tuple[Candidate, Worth]]]:
+    """The worth for TARGETS of no measurement, and that of each candidate, sorted by the width that
+    it leaves of the first target."""
     nothing = np.empty((len(found.targets), 0))
     now = worth(nothing, nothing, found.targets, np.random.default_rng(seed))
     each = [
         (one, worth(values, one.accuracy(values), found.targets, np.random.default_rng(seed)))
         for one, values in zip(CANDIDATES, found.values, strict=True)
     ]
-    return now, sorted(each, key=lambda pair: pair[1][0].width)
+    return now, sorted(each, key=lambda pair: pair[1].width[0])
 
 
 def report(found: Sample, given: int, seed: int, currents: tuple[float, float]) -> Report:
@@ -110,21 +110,21 @@ def report(found: Sample, given: int, seed: int, currents: tuple[float, float]) 
     rows = [_row(*one, now) for one in told]
     (first, best), (second, next_) = each[:2]
     # By rig: the median width that the other measurements leave.
-    usual = np.median([after[0].each for _, after in each[1:]], axis=0)
-    often = 100.0 * np.mean(best[0].each < usual)
-    other, leaves = min(each, key=lambda pair: pair[1][1].width)
+    usual = np.median([after.each[:, 0] for _, after in each[1:]], axis=0)
+    often = 100.0 * np.mean(best.each[:, 0] < usual)
+    other, leaves = min(each, key=lambda pair: pair[1].width[1])
     title = (
         f"Measure next: {first.name}. It is expected to narrow the 90 % interval of the robust "
-        f"velocity upwards from {brief(now[0].width * 1e3)} to {brief(best[0].width * 1e3)} mm/s"
+        f"velocity upwards from {brief(now.width[0] * 1e3)} to {brief(best.width[0] * 1e3)} mm/s"
     )
     ends = np.quantile(found.targets, (0.05, 0.95), axis=0) * 1e3
     notes = [
         f"{title}; the next best ({second.how.partition(':')[0]}) to "
-        f"{brief(next_[0].width * 1e3)} mm/s. On {often:.0f} % of the rigs it leaves less than the "
+        f"{brief(next_.width[0] * 1e3)} mm/s. On {often:.0f} % of the rigs it leaves less than the "
         f"median of the others. How: {first.how}.",
         f"That velocity is {ends[0, 0]:.1f} to {ends[1, 0]:.1f} mm/s as the device is, and "
         f"{ends[0, 1]:.1f} to {ends[1, 1]:.1f} mm/s with a falling sawtooth; of the latter's width "
-        f"{other.name} leaves the least, {100.0 * leaves[1].width / now[1].width:.0f} %.",
+        f"{other.name} leaves the least, {100.0 * leaves.width[1] / now.width[1]:.0f} %.",
         "The knobs have to be set on the machine: at the best settings of the scene's rig, 90 % of "
         f"the rigs give {_films(values)}.",
         f"The sample is {len(found.targets)} rigs: {given} that were found from the trials, and "
@@ -147,16 +147,14 @@ def report(found: Sample, given: int, seed: int, currents: tuple[float, float]) 
     )  # fmt: skip
 
 
-def _row(
-    name: str, how: str, accuracy: str, over: str, after: Sequence[Worth], now: Sequence[Worth]
-) -> Row:
+def _row(name: str, how: str, accuracy: str, over: str, after: Worth, now: Worth) -> Row:
     row: Row = {"measurement": name, "accuracy": accuracy, "90 % of the rigs": over}
-    for target, left, before in zip(TARGETS, after, now, strict=True):
+    for k, target in enumerate(TARGETS):
         row |= {
-            f"{target}: {WIDTH}": left.width * 1e3,
-            f"{target}: ± [mm/s]": left.error * 1e3,
-            f"{target}: {LEFT}": 100.0 * left.width / before.width,
-            f"{target}: holds [%]": 100.0 * left.held,
+            f"{target}: {WIDTH}": float(after.width[k]) * 1e3,
+            f"{target}: ± [mm/s]": float(after.error[k]) * 1e3,
+            f"{target}: {LEFT}": float(100.0 * after.width[k] / now.width[k]),
+            f"{target}: holds [%]": 100.0 * float(after.held[k]),
         }
     return row | {"how": how}
 

@@ -5,7 +5,7 @@ noise, the other rigs are weighted by their likelihood, and their weighted quant
 interval that the measurement would leave (leave-one-out cross-validation of importance weights).
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,18 +23,17 @@ DRAWS = 8
 """Draws of the measurement's noise on each rig."""
 
 
-@dataclass(frozen=True, eq=False)
-class Worth:
-    """The worth of one measurement for one target, over rigs taken as the truth and left out."""
+class Worth(NamedTuple):
+    """The worth of one measurement for each target, over rigs taken as the truth and left out."""
 
-    width: float
-    """Mean width of the intervals."""
-    error: float
+    width: Array
+    """Mean width of the intervals, by target."""
+    error: Array
     """Standard error of this mean."""
-    held: float
+    held: Array
     """Share of the intervals that contain the truth."""
     each: Array
-    """Widths for each true rig, means over the draws of the noise."""
+    """Widths for each true rig (rigs × targets), means over the draws of the noise."""
 
 
 def likely(values: Array, shown: Array, sd: Array) -> Array:
@@ -64,8 +63,8 @@ def interval(targets: Array, weights: Array) -> Array:
     return np.array(columns).T
 
 
-def worth(values: Array, sd: Array, targets: Array, rng: np.random.Generator) -> list[Worth]:
-    """The worth, for each target (rigs × targets), of a measurement whose ``values`` and ``sd`` are
+def worth(values: Array, sd: Array, targets: Array, rng: np.random.Generator) -> Worth:
+    """The worth, for ``targets`` (rigs × targets), of a measurement whose ``values`` and ``sd`` are
     rigs × numbers; without numbers, that of no measurement."""
     n = len(targets)
     widths, held = (np.empty((n, DRAWS, targets.shape[1])) for _ in range(2))
@@ -77,17 +76,14 @@ def worth(values: Array, sd: Array, targets: Array, rng: np.random.Generator) ->
             low, high = interval(targets[others], weights)
             widths[truth, draw] = high - low
             held[truth, draw] = (low <= targets[truth]) & (targets[truth] <= high)
-    each = widths.mean(axis=1)  # rigs × targets
+    each = widths.mean(axis=1)
     errors = each.std(axis=0, ddof=1) / np.sqrt(n)
-    told = zip(each.mean(axis=0), errors, held.mean(axis=(0, 1)), each.T, strict=True)
-    return [Worth(float(width), float(error), float(h), one) for width, error, h, one in told]
+    return Worth(each.mean(axis=0), errors, held.mean(axis=(0, 1)), each)
 
 
-def chance(targets: Array, rng: np.random.Generator) -> list[Worth]:
+def chance(targets: Array, rng: np.random.Generator) -> Worth:
     """The worth of an accurate measurement that does not depend on the targets, the mean of four:
     its intervals are narrower only because fewer rigs count."""
     n = len(targets)
     found = [worth(rng.random((n, 1)), np.full((n, 1), 1e-3), targets, rng) for _ in range(4)]
-    rows = [[[one.width, one.error, one.held, *one.each] for one in each] for each in found]
-    means: Array = np.mean(rows, axis=0)
-    return [Worth(float(one[0]), float(one[1]), float(one[2]), one[3:]) for one in means]
+    return Worth(*(np.mean(alike, axis=0) for alike in zip(*found, strict=True)))
