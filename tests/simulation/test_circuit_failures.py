@@ -201,15 +201,13 @@ def _spoil_or_run(spoil: int, progress: object) -> object:
     return os.getpid()
 
 
-class _Nobody:
+class _Nobody(ngspice.Leader):
     def __init__(self) -> None:
         self.places = [0, 0]
 
     def begin(self) -> None: ...
 
     def finish(self) -> None: ...
-
-    def loaded(self, engine: object) -> None: ...
 
     def stop(self) -> None: ...
 

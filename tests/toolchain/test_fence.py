@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from cosim.circuit import ngspice
 from cosim.coupling.loop import lead
 from cosim.errors import SimulationFailed
 from cosim.scene import load
@@ -191,15 +192,13 @@ def decks(folder: Path) -> list[str]:
     return [*found, *models(*places)]
 
 
-class _Nobody:
+class _Nobody(ngspice.Leader):
     def __init__(self) -> None:
         self.places = [0, 0]
 
     def begin(self) -> None: ...
 
     def finish(self) -> None: ...
-
-    def loaded(self, engine: object) -> None: ...
 
     def stop(self) -> None: ...
 
