@@ -4,9 +4,8 @@ All studies of many runs use it. A point that crashes or hangs does not affect t
 """
 
 from collections import deque
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
-from dataclasses import replace
 from functools import partial
 from itertools import groupby, islice
 from pathlib import Path
@@ -105,14 +104,21 @@ class Evaluator:
 
         for key, outcome in self._run(new()):
             if self._kept:
-                numbers = {k: v for k, v in outcome.numbers.items() if k in self._kept}
-                outcome = replace(outcome, numbers=numbers)
+                outcome = outcome.only(self._kept)
             stored[key] = vars(outcome)
             self._store.add(key, stored[key])
             known.extend((number, outcome) for number in waiting.pop(key))
             while known:
                 yield known.popleft()
         yield from known
+
+    def apply(
+        self, call: Callable[..., object], points: Iterable[int]
+    ) -> Iterator[tuple[int, object]]:
+        """The result of ``call(scene, number, progress)``, or its exception, for each number, in
+        ``workers`` threads of this machine; for results that no store holds, such as waveforms."""
+        with threads(self._scene, self._workers) as pool:
+            yield from each(pool, call, points)
 
     def forget(self) -> None:
         """The study is done: remove the file."""

@@ -1,9 +1,9 @@
 """One point of a study: the scene with some keys changed, run for the numbers of its summary."""
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite, isinf, nan
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,11 @@ class Outcome:
     failure: str = ""
     machine: bool = False
     """Whether the machine, not the point, may have caused the failure: worth another try."""
+
+    def only(self, names: Collection[str]) -> "Outcome":
+        """This outcome with some of its numbers only."""
+        kept = {name: value for name, value in self.numbers.items() if name in names}
+        return replace(self, numbers=kept)
 
 
 def evaluate(

@@ -13,9 +13,8 @@ import numpy as np
 import xarray as xr
 
 from cosim.errors import BadInput, Note, plain
-from cosim.evaluate.evaluator import Evaluator, workers_asked
+from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.keys import refuse_unknown
-from cosim.evaluate.many import each, threads
 from cosim.evaluate.point import Number, Settings, in_whole_periods
 from cosim.files.atomic import whole
 from cosim.mechanics import package as fmu
@@ -154,7 +153,7 @@ def _sweep(
         data = refreshed(last=True)
         if keep:
             points = [n for n in range(total) if not numbers.failures[n]]
-            _keep(family, scene, design, keep, points, workers)
+            _keep(family, scene, design, keep, points, bench)
         return data
 
 
@@ -164,13 +163,14 @@ def _keep(
     design: Design,
     names: Sequence[str],
     points: Sequence[int],
-    workers: int | None,
+    bench: Evaluator,
 ) -> None:
     """Run ``points`` again in threads of this process, and write the waveforms ``names`` of each,
     from ``run.settle`` on, as ``NUMBER.nc``. Raises CosimError."""
     from cosim.simulation.simulate import simulate
 
-    def kept(scene: Scene, number: int, progress: Progress) -> None:
+    def kept(_: Scene, number: int, progress: Progress) -> None:
+        # The scene that the evaluator passes records no waveforms.
         point = changed(scene, design.point(number), "--over")
         if design.changes_frequency:
             point = in_whole_periods(point)
@@ -183,10 +183,9 @@ def _keep(
         with whole(folder / f"{number}.nc") as temporary, temporary.open("wb") as file:
             netcdf(file, columns, result.units, {"frequency": repr(1.0 / point.period)})
 
-    with threads(scene, workers_asked(workers)) as pool:
-        for _, failed in each(pool, kept, points):
-            if isinstance(failed, Exception):
-                raise failed
+    for _, failed in bench.apply(kept, points):
+        if isinstance(failed, Exception):
+            raise failed
 
 
 def _motions(scene: Scene, design: Design, data: xr.Dataset) -> dict[str, str]:
