@@ -12,6 +12,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
 
 import build_c
+from cosim.simulation import checks
 from cosim.toolchain import processes
 from cosim.toolchain.libraries import FOLDER
 
@@ -84,6 +85,15 @@ def in_place() -> Iterator[None]:
     """Circuits run in the test's own process, in which it can change something."""
     with processes.in_place():
         yield
+
+
+@pytest.fixture(autouse=True)
+def _unchecked(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Quick tests run a scene alone, but those marked "checked": a run's checks make others, in
+    processes of their own, which take most of the time of a short run's test."""
+    if not any(map(request.node.get_closest_marker, ("checked", "slow"))):
+        monkeypatch.setattr(checks, "checked", lambda scene, run, strict: run())
+        monkeypatch.setattr(checks, "checked_ports", lambda scene, run: run())
 
 
 @pytest.fixture(scope="session")

@@ -43,6 +43,7 @@ def result() -> cosim.Result:
     return cosim.run("ideal-current", {**SHORT, "drive.amplitude": 6.0})
 
 
+@pytest.mark.checked
 def test_run_is_what_the_command_writes(result: cosim.Result, tmp_path: Path) -> None:
     """Overrides as a mapping, and the files of `save`, against `cosim run --set`."""
     sets = [f"--set={key}={value}" for key, value in (SHORT | {"drive.amplitude": 6.0}).items()]

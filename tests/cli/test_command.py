@@ -266,7 +266,8 @@ def worked(process: psutil.Process) -> float:
 
 @needs.posix
 @pytest.mark.parametrize(
-    "scene", ["paper", pytest.param("paper-full", marks=pytest.mark.slow), "ideal-current"]
+    "scene",
+    ["paper", *(pytest.param(x, marks=pytest.mark.slow) for x in ("paper-full", "ideal-current"))],
 )
 def test_interrupt(scene: str, tmp_path: Path) -> None:
     """At several moments of its own time: while it loads, while it simulates."""

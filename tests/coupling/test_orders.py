@@ -75,8 +75,8 @@ def joined_error(make: Make, steps: int) -> float:
     return error({name: np.array(values) for name, values in found.items()}, EXPECTED)
 
 
-QUICK = ("Jacobi k = 1", "EMF's slope, linear current", "iterated, Newton")
-"""One of each way to step: both sides at once, in turn, and again until they agree."""
+QUICK = ("Jacobi k = 1", "EMF's slope, linear current")
+"""One of each way to step once: both sides at the same time, and in turn."""
 EXTRA: dict[str, tuple[Make, int]] = {
     "Jacobi k = 1, slopes": (lambda a, b: Joint(a, b, Jacobi(1)), 2),
     "held EMF, linear current": (lambda a, b: Joint(a, b, GaussSeidel(0, feed=1)), 1),

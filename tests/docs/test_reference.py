@@ -27,6 +27,7 @@ def test_page_is_up_to_date(path: Path, text: str) -> None:
     assert path.read_text(encoding="utf-8") == text, "run `make docs`"
 
 
+@pytest.mark.checked
 @pytest.mark.filterwarnings("ignore")
 def test_every_number_of_a_run_has_its_meaning() -> None:
     """On every rung that has numbers of its own."""

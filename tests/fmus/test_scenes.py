@@ -113,6 +113,7 @@ Bclosed contact 0 V=(v(x)<0.1) ? 1 : 0
 """
 
 
+@pytest.mark.checked
 def test_slopes_of_a_current_that_has_died_down_are_not_judged() -> None:
     """At 1e-15 A the FMU's own steps show: 12 changes in a row off its slope were called wrong, so
     that scene `relay` had no error of its means."""

@@ -96,6 +96,7 @@ def test_the_fastest_that_is_allowed_is_solved() -> None:
     assert abs(result.summary["energy_residual"]) < 1e-6
 
 
+@pytest.mark.slow
 def test_a_run_without_an_end_is_told_at_its_beginning(tmp_path) -> None:
     values = [f"{key}={value}" for key, value in ENDLESS.items()]
     values += ["run.duration=1000", "run.output_step=1e-3"]

@@ -297,6 +297,7 @@ def test_a_crash_before_the_first_step_is_told_as_that(tmp_path: Path) -> None:
         run(motor(tmp_path))
 
 
+@pytest.mark.checked
 @pytest.mark.parametrize(
     ("function", "end"),
     [("int fmi2Terminate", "{ abort(); }"), ("void fmi2FreeInstance", "{ exit(5); }")],

@@ -106,6 +106,7 @@ def here(scene: Path, overrides: Mapping[str, Any]) -> cosim.Result:
         return cosim.run(scene, overrides)
 
 
+@pytest.mark.checked
 def test_power_is_what_flows_and_errors_hold(tmp_path: Path) -> None:
     scene, true = motor(tmp_path), plain(tmp_path, 0.02)
     result = cosim.run(scene)

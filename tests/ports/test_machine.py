@@ -120,7 +120,11 @@ def test_a_node_called_as_the_machine_calls_its_own_stays_the_netlists(tmp_path:
 
 @pytest.mark.parametrize(
     ("base", "contact", "alone"),
-    [("paper", "compliant", False), ("reference", "rigid", False), ("paper", "compliant", True)],
+    [
+        ("paper", "compliant", False),
+        pytest.param("reference", "rigid", False, marks=pytest.mark.slow),
+        pytest.param("paper", "compliant", True, marks=pytest.mark.slow),
+    ],
 )
 def test_as_an_fmu_like_others_the_machine_moves_alike(
     folder: Path, base: str, contact: str, alone: bool

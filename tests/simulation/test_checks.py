@@ -14,7 +14,7 @@ from cosim.simulation.simulate import simulate
 from cosim.waveforms.report import table
 from tests.simulation.test_against_reference import CASES, scene_of
 
-pytestmark = pytest.mark.physics
+pytestmark = [pytest.mark.physics, pytest.mark.checked]
 
 EXAMPLES = Path(__file__).parents[2] / "circuits" / "examples"
 

@@ -202,6 +202,7 @@ def test_summary_has_every_key(run: Run) -> None:
     assert ("ngspice" in summary["versions"]) == (summary["circuit_steps"] > 0)
 
 
+@pytest.mark.checked
 @pytest.mark.parametrize("name", RUNS)
 def test_written_scene_repeats_the_run(
     name: str, runs: dict[str, Run], tmp_path: Path, monkeypatch: pytest.MonkeyPatch

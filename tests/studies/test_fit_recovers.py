@@ -174,6 +174,7 @@ def test_a_trial_in_which_the_part_never_slips_determines_nothing(tmp_path: Path
     assert holds(row, truth)
 
 
+@pytest.mark.slow
 def test_mu_k_follows_from_known_forces(tmp_path: Path) -> None:
     """Bounds in newtons, with the mass of the part, 6 % on either side."""
     truth = made(tmp_path, "a")

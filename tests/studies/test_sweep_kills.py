@@ -130,6 +130,7 @@ def test_one_sweep_at_a_time(tmp_path: Path) -> None:
 
 
 @needs.posix
+@pytest.mark.slow
 def test_a_disk_full_in_mid_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """What was whole stays; with room again only the rest is run."""
     import resource
@@ -158,9 +159,8 @@ sys.exit(main(sys.argv[1:]))
 
 
 @needs.posix
-@pytest.mark.parametrize(
-    "whole", [True, pytest.param(False, marks=pytest.mark.slow)], ids=["all", "worker"]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("whole", [True, False], ids=["all", "worker"])
 def test_a_pause_spoils_no_point(whole: bool, tmp_path: Path) -> None:
     """Stopped for longer than a point may work without progress, with and without the parent."""
     command = [

@@ -37,6 +37,7 @@ def test_broken_periods_are_told(overrides: list[str], told: str | None) -> None
     assert told is None or told in text
 
 
+@pytest.mark.checked
 @pytest.mark.physics
 @pytest.mark.parametrize(("periods", "whole"), [(36, True), (38, False)])
 def test_periods_that_break_the_motions_repeats_are_told(periods: int, whole: bool) -> None:
