@@ -257,7 +257,7 @@ def test_no_measurement_hides_a_word(folder, words):
         "t\nR1 a 0 1\u2028.control\n.end\n".encode("utf-16-le"),
         b"t\nR1 a 0 " + b"1" * 10_000 + b"\n.end\n",
         b"t\nV1 a 0 PWL(" + b"1 " * 200_000 + b")\n.end\n",
-        b"t\n" + b"R1 a 0 1\n" * 100_001 + b".end\n",
+        pytest.param(b"t\n" + b"R1 a 0 1\n" * 100_001 + b".end\n", marks=pytest.mark.slow),
         b"",
         b"t",
     ],

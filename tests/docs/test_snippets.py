@@ -124,7 +124,17 @@ def pages(slow: bool) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize("page", pages(slow=False))
+FIRST = "README.md", "docs/tutorials/"
+"""What a newcomer reads: the beginnings of the pages whose quick blocks are run by `make test`."""
+
+
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, marks=[] if page.startswith(FIRST) else [pytest.mark.slow])
+        for page in pages(slow=False)
+    ],
+)
 @pytest.mark.filterwarnings("ignore")
 def test_page_runs(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """All but what is marked as slow."""

@@ -193,6 +193,7 @@ def test_pieces_in_closed_form() -> None:
 
 @examples(50)
 @given(levels=st.lists(st.floats(-0.5, 0.5), min_size=2, max_size=9), f=st.floats(1.0, 500.0))
+@pytest.mark.slow
 def test_a_table_of_steps_in_codes(levels: list[float], f: float) -> None:
     """The nearest codes of the levels, held for whole steps of 50 us; the mean at the pin's."""
     table = [list(pair) for pair in evenly(levels)]
@@ -461,6 +462,7 @@ def test_pwm_without_edges(pot: int) -> None:
     assert pin(drive, 0.3) in (0.0, 3.3)
 
 
+@pytest.mark.slow
 def test_pwm_edges_do_not_stand_beside_those_of_the_staircase() -> None:
     # every 25 periods an edge meets one of the 50 us steps, within rounding
     drive = made("drive.pwm_ripple=true", "drive.pot_max=1", "drive.pot_offset=0.2442",

@@ -300,7 +300,10 @@ def test_a_crash_before_the_first_step_is_told_as_that(tmp_path: Path) -> None:
 @pytest.mark.checked
 @pytest.mark.parametrize(
     ("function", "end"),
-    [("int fmi2Terminate", "{ abort(); }"), ("void fmi2FreeInstance", "{ exit(5); }")],
+    [
+        ("int fmi2Terminate", "{ abort(); }"),
+        pytest.param("void fmi2FreeInstance", "{ exit(5); }", marks=pytest.mark.slow),
+    ],
 )
 def test_a_crash_at_its_end_costs_no_results(tmp_path: Path, function: str, end: str) -> None:
     body = "{ free(m); }" if "Free" in function else "{ return !m; }"

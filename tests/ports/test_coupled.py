@@ -260,7 +260,14 @@ def test_slopes_that_an_fmu_tells_only_after_its_first_step_are_taken(tmp_path: 
 TELLS = "places[k] == OMEGA ? value(m, ALPHA) : 0.0;"
 
 
-@pytest.mark.parametrize("wrong", ["-value(m, ALPHA)", "3.0 * value(m, ALPHA)", "value(m, OMEGA)"])
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        "-value(m, ALPHA)",
+        pytest.param("3.0 * value(m, ALPHA)", marks=pytest.mark.slow),
+        pytest.param("value(m, OMEGA)", marks=pytest.mark.slow),
+    ],
+)
 def test_a_slope_by_which_nothing_changes_is_refused(tmp_path: Path, wrong: str) -> None:
     recompiled(tmp_path, (TELLS, f"places[k] == OMEGA ? {wrong} : 0.0;"))
     scene, true = motor(tmp_path, slopes=True), plain(tmp_path, 0.02)
@@ -474,7 +481,10 @@ Vemf y 0 0
 """
 
 
-@pytest.mark.parametrize("period", [5e-5, 1e-4, 2e-5, 3e-5, 3.1415926e-5])
+@pytest.mark.parametrize(
+    "period",
+    [5e-5, 3.1415926e-5, *(pytest.param(x, marks=pytest.mark.slow) for x in (1e-4, 2e-5, 3e-5))],
+)
 def test_no_edge_of_a_pulse_is_lost(tmp_path: Path, period: float) -> None:
     """A step ends on each corner, whatever lengths the steps have; also within a subcircuit."""
     scene = motor(tmp_path)

@@ -190,6 +190,7 @@ def test_a_measured_current_replaces_the_drive(tmp_path: Path) -> None:
 
 
 @pytest.mark.physics
+@pytest.mark.slow
 def test_own_numbers_are_found_on_the_true_rig(search: Search) -> None:
     """Half of the draws end in another minimum, in one trial at least."""
     rng = np.random.default_rng(2)
@@ -413,6 +414,7 @@ def test_verdicts() -> None:
 
 
 @pytest.mark.physics
+@pytest.mark.slow
 def test_deviations_are_of_the_size_of_the_scatter_of_fits(folder: Path) -> None:
     """Fits from beside the truth to records whose noise alone differs, where that is white."""
     space, rig, own = read_space(), read_space().rigs(point()[None])[0], np.array([*OWN.values()])

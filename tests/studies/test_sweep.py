@@ -323,6 +323,7 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert {path.name for path in tmp_path.iterdir()} == {"sweep.nc", "sweep.sqlite", "figure.png"}
 
 
+@pytest.mark.slow
 def test_motion_at_the_fastest_and_at_random_points_is_told() -> None:
     """The gripper's flexures ring for seconds: means over the first one are not the later ones. The
     rig of the trials has settled by then."""

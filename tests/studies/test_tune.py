@@ -126,6 +126,7 @@ def test_keys_twice() -> None:
         ranges_of(["drive.offset=0:1", "drive.offset=0:2"])
 
 
+@pytest.mark.slow
 def test_scouts_without_ngspice() -> None:
     """They go ahead where the scene needs ngspice, are counted apart, and lead on."""
     quick = ["run.duration=0.3", "run.settle=0.1", "circuit.max_step=5e-5"]

@@ -91,6 +91,7 @@ def test_hardening_where_the_compiler_has_it(copy: Path, tmp_path: Path) -> None
 
 
 @posix
+@pytest.mark.slow
 def test_changed_sources_are_another_fmu(copy: Path, hasty: str) -> None:
     definition = copy / "fmu/src/physics/variables.def"
     text = definition.read_text()
