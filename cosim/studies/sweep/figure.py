@@ -65,7 +65,7 @@ def draw(data: xr.Dataset, title: str) -> Picture:
             words += f"; drawn at {', '.join(_setting(shown[key]) for key in fixed)}, the best"
         v, most = _values(shown, V_AVERAGE), STAYS * V_AVERAGE.scale
         if (v < most).any() and (v > -most).any():
-            words += f"; black lines: ±{most:g} mm/s, within which the part stays (dashes)"
+            words += f"; black lines: ±{most:g} mm/s; dashes: the part stays"
     if of_ports(data):
         said = range_of(data, quantities[0].name, 4) or "all failed"
         headline(figure, f"{title}: {quantities[0].name} {said}\n{words}".replace("$", "\\$"))
