@@ -156,10 +156,10 @@ def _no_room(error: OSError) -> BadInput:
     return BadInput(f"{where}: cannot hold the waveforms while the scene runs ({error.strerror}).")
 
 
-def blocks(count: int, most: int = BLOCK) -> Iterator[slice]:
-    """Slices of at most ``most`` of ``count`` rows; after each, tapes' pages leave the memory."""
-    for start in range(0, count, most):
-        yield slice(start, min(start + most, count))
+def blocks(count: int) -> Iterator[slice]:
+    """Slices of at most BLOCK of ``count`` rows; after each, tapes' pages leave the memory."""
+    for start in range(0, count, BLOCK):
+        yield slice(start, min(start + BLOCK, count))
         release()
 
 
