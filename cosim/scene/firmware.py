@@ -65,6 +65,17 @@ def knob_offset(pot_offset: float, amplitude: float) -> float:
     return GAIN * volts(reading(pot_offset)) - amplitude / 2
 
 
+def knobs(amplitude: float, frequency: float, offset: float) -> dict[str, float]:
+    """The three potentiometers whose readings come nearest to a drive (V, Hz, V); beyond 0…1 where
+    no reading does."""
+    shares = {
+        "pot_max": amplitude / GAIN / V_REFERENCE,
+        "pot_frequency": 1 - (frequency - 1) / 99,
+        "pot_offset": offset_pin(offset, amplitude) / V_REFERENCE,
+    }
+    return {knob: (round(share * COUNTS) + 0.5) / COUNTS for knob, share in shares.items()}
+
+
 def offset_pin(offset: float, amplitude: float) -> float:
     """Voltage at the offset pin, V, for a mean ``offset`` and peak-to-peak ``amplitude`` at V1."""
     return (offset + amplitude / 2) / GAIN

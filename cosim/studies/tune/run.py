@@ -17,7 +17,7 @@ from cosim.errors import BadInput, Note, SimulationFailed, plain
 from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.keys import FREQUENCIES, numeric_key, refuse_unknown
 from cosim.evaluate.point import Number, Outcome, Settings, in_whole_periods
-from cosim.scene import Overrides, Scene, changed, load
+from cosim.scene import Overrides, Scene, changed, firmware, load
 from cosim.scene.messages import bad, suggestion
 from cosim.scene.tables import COMMANDS, MOST_CORNERS
 from cosim.search.known import Feasible, Known
@@ -81,7 +81,8 @@ def tune(
 
     ``maximise`` or ``minimise`` names the number; ``over`` gives the range of each ``table.key``,
     SI; by default the three knobs. Where the scene needs ngspice, a search with SCOUTS times as
-    many runs on the rung "limited" precedes and gives the start points. Where its solver is the
+    many runs on the rung "limited" precedes and gives the start points. The scene's own setting is
+    run first, where the ranges hold it, so that the result is no worse. Where its solver is the
     fast one, that one searches, and the FMU runs the best WARM points and all later ones. After the
     search each key of the best point is turned a little; a turn that is better becomes the best
     point, as long as the budget lasts. Results depend on ``seed``, not on the number of
@@ -256,14 +257,31 @@ class _Trial:
         return self.runs[int(found.argmax())] if len(found) and found.max() > -inf else None
 
     def search(self, runs: int, seed: int, warm: Array | None = None) -> None:
-        """Run at most ``runs`` points; ``warm`` (rows) come first and replace most exploration."""
+        """Run at most ``runs`` points, the scene's own first; ``warm`` (rows) come next and replace
+        most exploration."""
         keys, explored = len(self.ranges), round(EXPLORED * runs)
+        self.known.rows(self.own())
         if warm is not None:
             self.known.rows(warm[:explored])
             explored = max(explored, len(self.runs) + POPULATION)
         design = Design(keys, explored, seed)
         self.known.search({0: design}, explored - len(self.runs))
         self.known.search({0: Climb(keys, seed)}, runs - len(self.runs))
+
+    def own(self) -> Array:
+        """The scene's own setting as a point of the unit cube (one row), its drive by the nearest
+        turns of the knobs; no row where it lies beyond the ranges or a key has no value."""
+        drive = self.scene.drive
+        knobs = firmware.knobs(drive.amplitude, drive.frequency, drive.offset)
+        point = []
+        for name, (low, high) in self.ranges.items():
+            table, _, bare = name.partition(".")
+            value = getattr(getattr(self.scene, table), bare, None)
+            value = knobs.get(bare) if value is None else value
+            if value is None or not low <= value <= high:
+                return np.empty((0, len(self.ranges)))
+            point.append((value - low) / (high - low))
+        return np.array([point])
 
     def neighbours(self) -> dict[str, list[float | None]]:
         """The values with each key turned down and up from the best point; None if out of range."""
@@ -351,7 +369,8 @@ def _searched(
             scouts.search((1 if fast else SCOUTS) * searched, seed)
             ahead, warm = scouts.runs, scouts.known.ranked(0, WARM_APART, WARM)
     if fast:
-        trial.known.rows(warm)  # with the FMU; the fast solver has used the search's runs
+        # With the FMU; the fast solver has used the search's runs.
+        trial.known.rows(np.vstack([trial.own(), warm]))
     else:
         trial.search(searched, seed, warm)
     if trial.best is None:
