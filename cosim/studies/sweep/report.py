@@ -8,7 +8,7 @@ import xarray as xr
 from cosim.errors import SimulationFailed
 from cosim.scene.tables import KNOBS
 from cosim.studies.sweep.dataset import FAILURE, JUDGED
-from cosim.waveforms.quantities import with_unit
+from cosim.waveforms.quantities import percent, with_unit
 from cosim.waveforms.storage import swept
 
 MOST_REASONS = 5
@@ -104,10 +104,10 @@ def _judgement(data: xr.Dataset) -> list[str]:
     worst = known[error.argmax()]
     return [
         f"  fast solver against the FMU at {len(known)} points: median error "
-        f"{np.median(error) * 100:.2g} %, beyond {BEYOND * 100:g} % at "
+        f"{percent(np.median(error))}, beyond {BEYOND * 100:g} % at "
         f"{(error > BEYOND).mean() * 100:.3g} % of them (of v_average, at least {LEAST * 1e3:g} "
         "mm/s)",
-        f"  furthest off {float(f'{error.max() * 100:.2g}'):g} % at {at(data, worst)}",
+        f"  furthest off {percent(error.max())} at {at(data, worst)}",
     ]
 
 

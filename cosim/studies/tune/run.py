@@ -256,14 +256,11 @@ class _Trial:
         found = self.known.scores[: len(self.runs), 0]
         return self.runs[int(found.argmax())] if len(found) and found.max() > -inf else None
 
-    def search(self, runs: int, seed: int, warm: Array | None = None) -> None:
-        """Run at most ``runs`` points, the scene's own first; ``warm`` (rows) come next and replace
-        most exploration."""
+    def search(self, runs: int, seed: int, warm: Array) -> None:
+        """Run at most ``runs`` points; ``warm`` (rows) come first and replace most exploration."""
         keys, explored = len(self.ranges), round(EXPLORED * runs)
-        self.known.rows(self.own())
-        if warm is not None:
-            self.known.rows(warm[:explored])
-            explored = max(explored, len(self.runs) + POPULATION)
+        self.known.rows(warm[:explored])
+        explored = max(explored, len(self.runs) + POPULATION)
         design = Design(keys, explored, seed)
         self.known.search({0: design}, explored - len(self.runs))
         self.known.search({0: Climb(keys, seed)}, runs - len(self.runs))
@@ -359,18 +356,18 @@ def _searched(
     faces_each = 2 * len(trial.ranges)
     searched = min(round(SEARCHED * budget), budget - faces_each)
     ahead: list[Run] = []
-    warm = np.empty((0, len(trial.ranges)))
+    warm = trial.own()
     fast = trial.scene.run.solver == "fast"
     circuit = {} if fast else Fidelity.of(trial.scene).simple
     if circuit is not None:
         # BadInput: the simple model's summary lacks the quantity, so no search precedes.
         with nullcontext() if fast else suppress(BadInput):
             scouts = replace(trial, circuit=circuit, progress=scouting)
-            scouts.search((1 if fast else SCOUTS) * searched, seed)
-            ahead, warm = scouts.runs, scouts.known.ranked(0, WARM_APART, WARM)
+            scouts.search((1 if fast else SCOUTS) * searched, seed, warm)
+            ahead = scouts.runs
+            warm = np.vstack([warm, scouts.known.ranked(0, WARM_APART, WARM)])
     if fast:
-        # With the FMU; the fast solver has used the search's runs.
-        trial.known.rows(np.vstack([trial.own(), warm]))
+        trial.known.rows(warm)  # with the FMU; the fast solver has used the search's runs
     else:
         trial.search(searched, seed, warm)
     if trial.best is None:
