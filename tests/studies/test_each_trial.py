@@ -45,6 +45,20 @@ def test_a_run_of_the_scene_is_its_own_trial(
     assert "Trial #44.csv: there is no built-in scene trial-44" in said and said.count("\n") == 1
 
 
+@pytest.mark.parametrize("number", [1, 5, 9, 10])
+def test_a_saved_run_of_the_scene_covers_its_trial(
+    number: int, trials: Path, tmp_path: Path
+) -> None:
+    """The run's last row may lie a little before the trial's."""
+    run = cosim.run(f"trial-{number:02}", {"circuit.model": "limited"})
+    run.save(tmp_path / "run")
+    trial, out = trials / f"Trial #{number}.csv", tmp_path / "out"
+    assert main(["compare", str(tmp_path / "run"), str(trial), "--out", str(out)]) == 0
+    whole = cosim.compare(run.scene, trial, aligned=True)
+    saved = cosim.compare(tmp_path / "run", trial)
+    assert saved.numbers["velocity_r2"] == pytest.approx(whole.numbers["velocity_r2"], abs=1e-3)
+
+
 def test_the_published_trials(trials: Path, tmp_path: Path) -> None:
     """The nine trials that were fitted are repeated better than a straight line does, and their
     errors are those of the columns themselves."""

@@ -153,7 +153,11 @@ def measure(
                 f"The run ends at {end:.4g} s, and covers {len(recording.time)} rows of "
                 f"{plain(recording.name)}: there must be {LEAST_ROWS}."
             )
-        seen = replace(seen, recording=recording)
+    elif earliest + recording.time[-1] > end + 1e-9 >= earliest + recording.time[-2]:
+        # A run of a trial's own scene ends at the last multiple of its output step.
+        recording = recording.rows(slice(-1))
+        notes.append("The recording's last row lies beyond the run's end, and is left out.")
+    seen = replace(seen, recording=recording)
     rows, span = len(recording.time), float(recording.time[-1])
     if earliest + span > end + 1e-9:
         needed = earliest + span * rows / (rows - 1)
