@@ -18,7 +18,8 @@ from cosim.trials.recording import Recording
 from cosim.waveforms.columns import COLUMNS
 
 # Of a column: powers of ten, and both signs.
-FACTORS = [sign * 10.0**power for power in range(-6, 7) for sign in (1, -1)]
+FACTORS = np.array([sign * 10.0**power for power in range(-6, 7) for sign in (1, -1)])
+UNCHANGED = int(np.flatnonzero(FACTORS == 1.0)[0])
 CLOCKS = np.linspace(0.988, 1.012, 25)
 """Factors of the recording's times."""
 
@@ -67,13 +68,13 @@ def hints(recording: Recording, observe: Observe, guide: str, starts: Array) -> 
     for name, values in measured.items():
         velocity = name.replace("z_", "v_", 1)
         runs = laid if velocity == guide else [observe(recording, velocity, start)]
-        shares = {factor: [explained(run, factor * values) for run in runs] for factor in FACTORS}
-        factor = max(shares, key=lambda factor: max(shares[factor]))
-        hint = _hint(COLUMNS[name].text, max(shares[factor]), max(shares[1.0]))
-        if factor != 1.0 and hint:
+        shares = np.array([_of_scaled(run, values) for run in runs])
+        best = int(np.argmax(shares.max(axis=0)))
+        hint = _hint(COLUMNS[name].text, *shares[:, [best, UNCHANGED]].max(axis=0))
+        if best != UNCHANGED and hint:
             fine = False
-            start = starts[int(np.argmax(shares[factor]))] if name == guide else start
-            yield hint + _scaled(recording, name, factor)
+            start = starts[int(np.argmax(shares[:, best]))] if name == guide else start
+            yield hint + _scaled(recording, name, float(FACTORS[best]))
     for sentence in _of_other_motion(recording, observe, laid, guide, start) if fine else ():
         fine = False
         yield sentence
@@ -89,6 +90,16 @@ def hints(recording: Recording, observe: Observe, guide: str, starts: Array) -> 
         hint = _hint(COLUMNS[guide].text, clocks[clock], clocks[1.0])
         if hint and clocks[clock] - clocks[1.0] > 0.02:
             yield f"{hint} with times multiplied by {clock:.3f}: is its frame rate right?"
+
+
+def _of_scaled(run: Array, values: Array) -> Array:
+    """What ``explained(run, factor * values)`` is for each of the FACTORS, by sums of products."""
+    known = np.isfinite(run) & np.isfinite(values)
+    run, values = run[known], values[known]
+    if not len(values) or np.ptp(values) == 0.0:
+        return np.full(len(FACTORS), np.nan)
+    missed = values @ values - 2.0 * (values @ run) / FACTORS + (run @ run) / FACTORS**2
+    return 1.0 - missed / np.sum((values - values.mean()) ** 2)
 
 
 def _of_other_motion(

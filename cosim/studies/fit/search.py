@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import ndtri, stdtrit
 
 from cosim.arrays import Array
 from cosim.studies.fit.slides import Rows, Slide, marginal, slides_of
@@ -181,7 +181,7 @@ def _interval(value: float, likely: Interval, drawn: Array, count: int, limit: I
     """The wider one, at either end, of the profile's interval ``likely`` and of the quantiles of
     the bootstrap's values ``drawn``, within ``limit``. ``few`` widens the latter for few slides, as
     Student's distribution exceeds the normal one."""
-    few = float(student.ppf((1 + LEVEL) / 2, max(1, count - 1)) / student.ppf((1 + LEVEL) / 2, 1e9))
+    few = float(stdtrit(max(1, count - 1), (1 + LEVEL) / 2) / ndtri((1 + LEVEL) / 2))
     ends = []
     for end, share, side in ((likely[0], (1 - LEVEL) / 2, -1), (likely[1], (1 + LEVEL) / 2, 1)):
         scatter = few * (float(np.quantile(drawn, share)) - value)
