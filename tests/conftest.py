@@ -12,6 +12,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
 
 import build_c
+from cosim.files import picture
 from cosim.simulation import checks
 from cosim.toolchain import processes
 from cosim.toolchain.libraries import FOLDER
@@ -94,6 +95,12 @@ def _unchecked(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) 
     if not any(map(request.node.get_closest_marker, ("checked", "slow"))):
         monkeypatch.setattr(checks, "checked", lambda scene, run, strict: run())
         monkeypatch.setattr(checks, "checked_ports", lambda scene, run: run())
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures are written, but blank: to draw one takes half a second."""
+    monkeypatch.setattr(picture.FigureCanvasAgg, "draw", picture.FigureCanvasAgg.get_renderer)
 
 
 @pytest.fixture(scope="session")

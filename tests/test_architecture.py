@@ -6,6 +6,7 @@ must know. The floors follow from the imports, so there is no list to keep.
 
 import ast
 from collections import defaultdict
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
 from pathlib import Path
@@ -54,6 +55,7 @@ def room(module: str) -> str:
     return module if path.parent == PACKAGE else name(path.parent / "__init__.py")
 
 
+@cache
 def arrows() -> Arrows:
     found: Arrows = defaultdict(list)
     for module, path in MODULES.items():

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import scipy.signal
 
 import cosim
 from cosim.arrays import Array
@@ -831,10 +830,12 @@ LAPLACES = {
 @pytest.mark.parametrize("lines", LAPLACES)
 def test_filters_in_s_answer_as_their_transfer_function(lines: str, tmp_path: Path) -> None:
     """As scipy has it, from rest."""
+    from scipy.signal import lsim  # takes a second, and only this test needs it
+
     parameters = f".param tau={TAU} w={W} none=0\n"
     columns = columns_of(tmp_path, f"{parameters}{lines}\nR8 x 0 1Meg", "v(x)", "v(in)")
     time = np.linspace(0, 3e-3, len(columns["time"]))
-    _, true, _ = scipy.signal.lsim(LAPLACES[lines], np.sin(OMEGA * time), time)
+    _, true, _ = lsim(LAPLACES[lines], np.sin(OMEGA * time), time)
     error = np.abs(columns["v(x)"] - np.interp(columns["time"], time, true))
     assert error[5:].max() < 2e-3 * np.abs(true).max()
 

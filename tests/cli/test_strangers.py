@@ -7,7 +7,7 @@ import pytest
 from cosim.cli.main import main
 from cosim.scene import keys
 
-pytestmark = pytest.mark.reliability
+pytestmark = [pytest.mark.reliability, pytest.mark.usefixtures("undrawn")]
 
 ODD = [
     "../../planted",

@@ -4,55 +4,76 @@ ngspice keeps state, and an error in a netlist disables the library for good.
 """
 
 import json
+import logging
+import multiprocessing
 import os
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from PySpice.Spice.NgSpice.Shared import NgSpiceShared
 
 from tests.helpers.ngspice_alone import LIBRARY
 
 CIRCUITS = Path(__file__).resolve().parents[2] / "circuits"
 
-# Loads each deck, runs it, stores its last plot and its step counts; EXTERNAL sources
-# named in `external` follow (t, value) points, joined by straight lines.
-CHILD = r"""
-import json, logging, re, sys
-import numpy as np
-logging.disable(logging.CRITICAL)
-from PySpice.Spice.NgSpice.Shared import NgSpiceShared
-job = json.load(sys.stdin)
-class Shared(NgSpiceShared):
-    log = []
+# A process that has imported all this, and never loads ngspice, is forked for each call: imports
+# take longer than most runs.
+FRESH = multiprocessing.get_context("forkserver" if os.name == "posix" else "spawn")
+if os.name == "posix":
+    FRESH.set_forkserver_preload([__name__])
+
+
+class Alone(NgSpiceShared):
+    LIBRARY_PATH = LIBRARY
+
+    def __init__(self, external):
+        self.said, self.external = [], external
+        super().__init__()
+
     def send_char(self, message, ngspice_id):
-        self.log.append(message)
+        self.said.append(message)
         return 0
+
     def get_vsrc_data(self, voltage, time, node, ngspice_id):
-        voltage[0] = np.interp(time, *job["external"][node.lower()])
+        voltage[0] = np.interp(time, *self.external[node.lower()])
         return 0
+
     def do(self, command):
         try:
             return self.exec_command(command)
         except Exception:  # the wrapper takes any message on stderr for an error
             return self.stdout
-ngspice = Shared()
-for deck in job["decks"]:
-    ngspice.log.clear()
-    ngspice.do("source " + deck)
-    ngspice.do("run")
-    usage = ngspice.do("rusage all")
-    count = {k: int(float(m.group(1))) for k, p in
-             (("accepted", "Accepted timepoints"), ("rejected", "Rejected timepoints"),
-              ("iterations", "Total iterations"))
-             if (m := re.search(p + r" = (\S+)", usage))}
-    plot = ngspice.plot(None, ngspice.last_plot)
-    np.savez(deck + ".npz", **{k: np.array(v._data) for k, v in plot.items()})
-    with open(deck + ".json", "w") as file:
-        json.dump({"count": count, "log": ngspice.log}, file)
-"""
+
+
+def alone(folder, said, paths, external):
+    """Loads each deck, runs it, stores its last plot and its step counts."""
+    output = os.open(said, os.O_WRONLY | os.O_CREAT)
+    for number in (1, 2):
+        os.dup2(output, number)
+    os.chdir(folder)
+    logging.disable(logging.CRITICAL)
+    ngspice: Any = Alone(external)
+    for deck in paths:
+        ngspice.said.clear()
+        ngspice.do("source " + deck)
+        ngspice.do("run")
+        usage = ngspice.do("rusage all")
+        count = {
+            k: int(float(m.group(1)))
+            for k, p in (
+                ("accepted", "Accepted timepoints"),
+                ("rejected", "Rejected timepoints"),
+                ("iterations", "Total iterations"),
+            )
+            if (m := re.search(p + r" = (\S+)", usage))
+        }
+        plot = ngspice.plot(None, ngspice.last_plot)
+        vectors: Any = {k: np.array(v._data) for k, v in plot.items()}
+        np.savez(deck + ".npz", **vectors)
+        Path(deck + ".json").write_text(json.dumps({"count": count, "log": ngspice.said}))
 
 
 class Result(dict):
@@ -63,7 +84,8 @@ class Result(dict):
 
 
 def run_all(folder, *decks, external=None) -> list[Result]:
-    """Runs the decks (text) in `folder`, beside copies of the libraries."""
+    """Runs the decks (text) in `folder`, beside copies of the libraries. EXTERNAL sources named in
+    `external` follow (t, value) points, joined by straight lines."""
     for library in CIRCUITS.glob("*.lib"):
         shutil.copy(library, folder)
     paths = []
@@ -71,19 +93,15 @@ def run_all(folder, *decks, external=None) -> list[Result]:
         path = folder / f"deck{number}.cir"
         path.write_text(deck)
         paths.append(str(path))
-    done = subprocess.run(
-        [sys.executable, "-c", CHILD],
-        input=json.dumps({"decks": paths, "external": external or {}}),
-        env={**os.environ, "NGSPICE_LIBRARY_PATH": str(LIBRARY)},
-        cwd=folder,
-        text=True,
-        capture_output=True,
-        timeout=120,
-    )
+    said = folder / "said"
+    process = FRESH.Process(target=alone, args=(folder, said, paths, external or {}))
+    process.start()
+    process.join(120)
+    process.kill()
     results = []
     for path in paths:
         if not Path(path + ".json").exists():
-            raise AssertionError(f"ngspice failed:\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}")
+            raise AssertionError(f"ngspice failed:\n{said.read_text(errors='replace')[-4000:]}")
         with np.load(path + ".npz") as data:
             result = Result({k.lower(): data[k] for k in data.files})
         stored = json.loads(Path(path + ".json").read_text())

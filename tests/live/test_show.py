@@ -20,6 +20,8 @@ from cosim.waveforms import formats
 from cosim.waveforms.storage import netcdf
 from tests.helpers.examples import examples
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 MARKUP = "</script><img src=x onerror=alert(1)><b>bold</b>"
 DRAWN = "() => document.readyState === 'complete'"
 

@@ -15,6 +15,8 @@ from cosim.toolchain.processes import in_place
 from tests.ports.foreign import recompiled, reworded
 from tests.ports.test_coupled import motor
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 OUTPUT, UNIT = 'der(ω_"1", é) <&>', "°/µs"
 
 

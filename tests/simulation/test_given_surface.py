@@ -19,7 +19,7 @@ from cosim.simulation.simulate import simulate
 from tests.helpers.fmu_bench import Bench
 from tests.helpers.sine_part import SinePart
 
-pytestmark = pytest.mark.physics
+pytestmark = [pytest.mark.physics, pytest.mark.usefixtures("undrawn")]
 
 
 def fmu_part(

@@ -12,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from matplotlib.image import imread
-from scipy.signal import savgol_filter
 
 from cosim.cli.main import main
 from cosim.mechanics import stickslip
@@ -203,11 +202,9 @@ def test_summary_has_every_key(run: Run) -> None:
 
 
 @pytest.mark.checked
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("name", RUNS)
-def test_written_scene_repeats_the_run(
-    name: str, runs: dict[str, Run], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("cosim.files.picture.FigureCanvasAgg.print_png", lambda *_, **__: None)
+def test_written_scene_repeats_the_run(name: str, runs: dict[str, Run], tmp_path: Path) -> None:
     again = cosim_run(tmp_path, str(runs[name].folder / "scene.toml"))
     for file in ("waveforms.csv", "waveforms.nc", "scene.toml"):
         assert (again.folder / file).read_bytes() == (runs[name].folder / file).read_bytes(), file
@@ -330,6 +327,8 @@ def test_what_is_read_within_a_step_is_that_of_its_steps(model: str) -> None:
 
 def parabolas(heights: Array) -> Array:
     """Second derivatives of the least-squares parabolas through five frames each, by SciPy."""
+    from scipy.signal import savgol_filter  # takes a second, and only this test needs it
+
     return np.asarray(savgol_filter(heights, 5, 2, deriv=2, delta=1 / 960)[2:-2])
 
 

@@ -242,6 +242,7 @@ def test_r2() -> None:
 # --- instruments --------------------------------------------------------------
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(
     ("header", "column", "scale", "score"),
     [

@@ -56,7 +56,7 @@ def test_a_saved_run_of_the_scene_covers_its_trial(
     assert main(["compare", str(tmp_path / "run"), str(trial), "--out", str(out)]) == 0
     whole = cosim.compare(run.scene, trial, aligned=True)
     saved = cosim.compare(tmp_path / "run", trial)
-    assert saved.numbers["velocity_r2"] == pytest.approx(whole.numbers["velocity_r2"], abs=1e-3)
+    assert saved.numbers["velocity_r2"] == pytest.approx(whole.numbers["velocity_r2"], abs=5e-3)
 
 
 def test_the_published_trials(trials: Path, tmp_path: Path) -> None:

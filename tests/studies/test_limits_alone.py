@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.signal import savgol_filter
 
 import cosim
 from cosim.coupling.loop.agenda import exposures
@@ -66,6 +65,8 @@ def test_rows_drawn_blind_are_what_another_solver_finds() -> None:
             tol=1e-8,
             times=exposures(run.duration, run.settle, run.shutter).tolist(),
         )
+        from scipy.signal import savgol_filter  # takes a second, and only this test needs it
+
         heights = found.samples["z_surface"]
         seen = np.array(savgol_filter(heights, 5, 2, deriv=2, delta=1.0 / FRAME_RATE))
         told = cosim.run(scene).summary["v_average_error"] if scene.rung.ngspice else 0.0

@@ -15,6 +15,8 @@ import cosim
 from cosim.cli.main import main
 from cosim.trials.camera import hermite
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 Array = npt.NDArray[np.float64]
 HEADER = "time [s],surface [mm],part [mm]"
 FRAMES = np.arange(300) / 960.0

@@ -31,6 +31,8 @@ from cosim.studies.sweep.run import sweep
 from cosim.toolchain import processes
 from cosim.toolchain.processes import in_place
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 SHORT = ["run.duration=0.1", "run.settle=0.05"]
 
 

@@ -19,7 +19,7 @@ from cosim.cli.main import main
 from cosim.studies.sweep.run import sweep
 from tests.helpers import needs
 
-pytestmark = pytest.mark.reliability
+pytestmark = [pytest.mark.reliability, pytest.mark.usefixtures("undrawn")]
 
 THREADS, PROCESSES = "ideal-current", "paper"
 KNOBS = [f"drive.{knob}=0.05:0.9" for knob in ("pot_max", "pot_frequency", "pot_offset")]

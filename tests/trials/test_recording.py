@@ -128,6 +128,7 @@ def test_no_published_trial_is_told_a_flaw(trials: Path) -> None:
         assert not found.notes and not found.understood["gaps"], path
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("scene", ["trial-06", "quaid", "held"])
 def test_no_run_is_told_a_flaw(scene: str, tmp_path: Path) -> None:
     """One that rests on a wall in the end, one that repeats from frame to frame, one at rest."""

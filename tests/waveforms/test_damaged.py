@@ -10,7 +10,7 @@ from cosim.cli.main import main
 from cosim.errors import BadInput
 from cosim.waveforms import formats
 
-pytestmark = pytest.mark.reliability
+pytestmark = [pytest.mark.reliability, pytest.mark.usefixtures("undrawn")]
 
 SHORT = ["--set", "run.duration=0.03", "--set", "run.settle=0", "--set", "run.output_step=2e-3"]
 

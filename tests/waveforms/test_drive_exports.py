@@ -9,6 +9,8 @@ import pytest
 from cosim.cli.main import main
 from tests.helpers.ngspice_alone import run
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 STEPS = "drive.table=[[0, 0.5], [0.25, -0.5], [0.75, 0.0]]"
 SHAPES = {
     "steps": lambda phase: 0.5 if phase < 0.25 else -0.5 if phase < 0.75 else 0.0,

@@ -25,6 +25,8 @@ from cosim.waveforms.formats import formats
 from cosim.waveforms.formats.tracker import number
 from tests.helpers.ngspice_alone import LIBRARY
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 Array = npt.NDArray[np.float64]
 
 ELECTRIC = ["command", "current", "coil_voltage", "back_emf"]

@@ -11,7 +11,7 @@ from cosim.errors import Note
 from cosim.waveforms import formats
 from cosim.waveforms.identity import FILES
 
-pytestmark = pytest.mark.reliability
+pytestmark = [pytest.mark.reliability, pytest.mark.usefixtures("undrawn")]
 
 SHORT = {"run.duration": 0.02, "run.settle": 0.0}
 
