@@ -159,6 +159,24 @@ def test_what_no_sweep_goes_over(over: Any, more: dict[str, Any], words: str) ->
     assert words in str(caught.value) and len(str(caught.value)) < 500
 
 
+@pytest.mark.parametrize(
+    ("over", "words"),
+    [
+        (["drive.offset"], "must give each key its range"),
+        ({1: (0, 1)}, "--over 1: there is no such key"),
+        *(
+            ({"drive.offset": ends}, "must be LOW and HIGH, LOW below HIGH, each a number")
+            for ends in (5, None, (1,), (0, 1, 2), "01", ("a", "b"), [[0, 1], [1, 2]], (1, ENDLESS))
+        ),
+    ],
+    ids=range(10),
+)
+def test_what_no_search_goes_over(over: Any, words: str) -> None:
+    with pytest.raises(cosim.BadInput) as caught:
+        cosim.tune("held", SHORT, maximise="v_average", over=over)
+    assert words in str(caught.value) and len(str(caught.value)) < 500
+
+
 def test_names_of_a_sweep() -> None:
     """A key by itself where that can be typed, else with its table."""
     over = {"coil.count": [1, 2], "drive.amplitude": [6.0, 8.0], "circuit.reltol": [1e-5]}

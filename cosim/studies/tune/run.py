@@ -18,7 +18,7 @@ from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.keys import FREQUENCIES, numeric_key, refuse_unknown
 from cosim.evaluate.point import Number, Outcome, Settings, in_whole_periods
 from cosim.scene import Overrides, Scene, changed, firmware, load
-from cosim.scene.messages import bad, suggestion
+from cosim.scene.messages import bad, shown, suggestion
 from cosim.scene.tables import COMMANDS, MOST_CORNERS
 from cosim.search.known import Feasible, Known
 from cosim.search.searches import POPULATION, Climb, Design
@@ -101,7 +101,7 @@ def tune(
     Raises BadInput for bad keys, ranges, quantities; SimulationFailed if all runs failed.
     """
     quantity, largest = maximise or minimise, minimise is None
-    if quantity is None or (maximise and minimise):
+    if not isinstance(quantity, str) or (maximise and minimise):
         raise BadInput("tune: either maximise or minimise must name a number of the summary.")
     scene = load(scene, overrides)
     check_seed(seed)
@@ -217,12 +217,21 @@ def most_heat(scene: Scene, limit: float | str | None) -> float:
 
 
 def _checked(over: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
-    for name, (low, high) in over.items():
-        key = numeric_key(name)
-        if not (key.holds(low) and key.holds(high) and low < high):
-            words = f"must be LOW:HIGH, LOW below HIGH, each {key.allowed}"
-            raise BadInput(f"--over {name}={low:g}:{high:g}: {words}.")
-    return dict(over)
+    if not isinstance(over, Mapping):
+        raise BadInput(f"--over {shown(over)}: must give each key its range.")
+    found = dict[str, tuple[float, float]]()
+    for name, ends in over.items():
+        key = numeric_key(str(name))
+        try:
+            low, high = ends
+            sound = key.holds(low) and key.holds(high) and low < high
+        except (TypeError, ValueError):  # not two, or no numbers
+            sound = False
+        if not sound:
+            words = f"must be LOW and HIGH, LOW below HIGH, each {key.allowed}"
+            raise BadInput(f"--over {name}: {shown(ends)} {words}.")
+        found[name] = ends
+    return found
 
 
 Progress = Callable[[Run, Run | None], None]
