@@ -73,7 +73,10 @@ def test_page_from_a_file(tab: Any, tmp_path: Path) -> None:
     assert tab.evaluate(AMPLITUDE) == pytest.approx(turned, rel=2e-3)
     assert "drive.pot_max=" in tab.url
 
-    tab.click("#sound")
+    measured = [span.partition(":")[0] for span in tab.locator("#measure span").all_inner_texts()]
+    assert len({*measured}) == 6, "B−A, and each panel by its name"
+    assert tab.evaluate("() => { for (let k = 0; k < 2; k++) $('sound').click(); }") is None
+    assert tab.inner_text("#sound") == "Starting …"
     tab.wait_for_function("() => audio && audio.state === 'running' && history_.last > 4800")
     wide = tab.evaluate("() => document.documentElement.scrollWidth")
     assert wide <= 390

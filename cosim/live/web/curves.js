@@ -204,11 +204,10 @@ class Curves {
     const time = (to - from) * this.window.span / RATE;
     const words = [`B−A ${(time * 1e3).toFixed(2)} ms (${time ? (1 / Math.abs(time)).toFixed(1) : "∞"} Hz)`];
     if (a !== null && b !== null) {
-      for (const panel of this.panels) for (const [label, name, , factor] of panel.lines) {
-        if (name === "camera") continue;
-        const value = this.value(name, factor), digits = panel.unit === "mm" || panel.unit === "A" ? 3 : 1;
-        const what = panel.lines.length > 1 || panel.unit.length < 3 ? `${label} ` : "";
-        words.push(`${what}${value(a).toFixed(digits)} → ${value(b).toFixed(digits)} ${panel.unit}`);
+      for (const { name, unit, lines } of this.panels) {
+        const digits = unit === "mm" || unit === "A" ? 3 : 1, own = lines.filter(([, which]) => which !== "camera");
+        const ends = own.map(([label, which, , factor]) => `${label} ${[a, b].map((row) => this.value(which, factor)(row).toFixed(digits)).join(" → ")}`);
+        words.push(`${name}: ${ends.map((end) => end.replaceAll(" ", "\u00a0")).join(", ")}`);
       }
     }
     this.tell(words);

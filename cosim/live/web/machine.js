@@ -79,10 +79,6 @@ class Machine {
     this._ok(this.c.machine_set(this.references.normal_force, force), "the force");
   }
 
-  go(to) {
-    this._ok(this.c.machine_go(to));
-  }
-
   /* The next row, into `into` from `at` on. */
   next(into, at) {
     this.row++;

@@ -273,7 +273,11 @@ $("waveform").onchange = () => {
 $("polarity").onchange = () => set({ "coil.polarity": Number($("polarity").value) });
 $("speed").onchange = () => { state.speed = Number($("speed").value); pace(); };
 $("pause").onclick = () => { state.paused = !state.paused; $("pause").setAttribute("aria-pressed", String(state.paused)); pace(); };
-$("sound").onclick = () => change($("sound").getAttribute("aria-pressed") !== "true").catch((error) => fault(`No sound: ${error.message}`));
+$("sound").onclick = () => {
+  const told = (textContent, disabled) => Object.assign($("sound"), { textContent, disabled });
+  told("Starting …", true); // a second click would start a second machine
+  change($("sound").getAttribute("aria-pressed") !== "true").catch((error) => fault(`No sound: ${error.message}`)).finally(() => told("Sound", false));
+};
 $("gain").oninput = () => loudness();
 $("again").onclick = () => take({ scene: state.setting.scene, changes: {} }, true);
 $("copy").onclick = () => {
