@@ -32,6 +32,9 @@ BLOCK = 1 << 15
 BUCKET = 256
 """Rows."""
 
+PERIODS = 10
+"""A run of more than twice as many opens at so many, its last ones: far more are a mere band."""
+
 MOST_POINTS = 100_000  # of a sweep
 _HEAD = re.compile(r"(.+) \[(.+)\]")  # name [unit]
 
@@ -67,7 +70,11 @@ def _read(results: Path) -> tuple[dict[str, Any], list[Run]]:
         with _whole_results(results / "summary.json") as summary:
             words = "\n\n".join([table(scene, summary, found.units), *summary.get("notes", [])])
         told = {"title": scene.name, "about": scene.description, "words": words}
-        return told | {"signals": _signals(found.units, runs)}, runs
+        signals = _signals(found.units, runs)
+        periods = float(np.ptp(runs[0][0])) / scene.period
+        if periods > 2 * PERIODS:
+            signals["opens"] = -PERIODS / periods
+        return told | {"signals": signals}, runs
     if (results / "sweep.nc").exists():
         return _sweep(results)
     if (results / "compare.json").exists():
@@ -218,7 +225,8 @@ def _signals(units: dict[str, str], runs: list[Run]) -> dict[str, Any]:
         most = max(float(np.nanmax(np.abs(run[k]), initial=0.0)) for run in runs)
         columns.append({"name": name, "unit": unit, "most": most})
     heads = [_head(run) for run in runs]
-    return {"columns": columns, "panels": [*panels.values()], "runs": heads}
+    opens = 1.0 if len(runs) == 1 else 0.15
+    return {"columns": columns, "panels": [*panels.values()], "runs": heads, "opens": opens}
 
 
 def _head(run: Run) -> dict[str, Any]:

@@ -77,6 +77,18 @@ def test_a_run(tab: Any, run: Path) -> None:
     assert tab.evaluate("() => signals.cursors.at[0]") != before
 
 
+def test_a_long_run_opens_at_its_last_periods(tab: Any, tmp_path: Path) -> None:
+    """All of it is a button away."""
+    settings = {"drive.frequency": 50.0, "run.duration": 1.0, "run.settle": 0.2}
+    cosim.run("paper-limited", settings).save(tmp_path)
+    show(tmp_path)
+    opened(tab, tmp_path / "show.html")
+    assert tab.evaluate("() => signals.view") == pytest.approx([0.8, 1.0])
+    assert tab.evaluate("() => signals.cursors.at") == pytest.approx([0.85, 0.95])
+    tab.get_by_role("button", name="All").click()
+    assert tab.evaluate("() => signals.view") == pytest.approx([0.0, 1.0])
+
+
 def test_many_rows(tab: Any, run: Path, tmp_path: Path) -> None:
     """Far out, lowest and highest of all rows in each column of pixels; close up, each row."""
     source, count = formats.read(run), 5 * BLOCK

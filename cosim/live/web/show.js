@@ -70,7 +70,7 @@ class Rows {
 
 /* Curves of one run, or of a family of which one is chosen. */
 class Signals {
-  constructor(place, { runs, columns, panels }) {
+  constructor(place, { runs, columns, panels, opens }) {
     Object.assign(this, { runs: runs.map((run, k) => new Rows(run, k)), columns, chosen: 0 });
     const bar = made(place, "div", "", "row");
     const within = (from, to) => () => this.look([from, to].map((share) => this.view[0] + share * (this.view[1] - this.view[0])));
@@ -90,13 +90,14 @@ class Signals {
       return { plot, factor, unit, lines: own.map((k, n) => [columns[k].name, ["a", "b", "d", "c", "ink"][n % 5], k]) };
     });
     this.table = made(place, "table");
-    this.all(runs.length > 1 ? 0.15 : 1);
+    this.all(opens);
   }
 
-  all(first = 1) {
+  all(share = 1) { // of the time; below 0 at its end
     const [from, to] = this.whole = extent(this.runs.flatMap((run) => [run.begin, run.end].map((x) => x * run.per)));
-    this.cursors.at = [0.25, 0.75].map((share) => from + share * first * (to - from));
-    this.look([from, from + first * (to - from)]);
+    const long = Math.abs(share) * (to - from), start = share < 0 ? to - long : from;
+    this.cursors.at = [0.25, 0.75].map((part) => start + part * long);
+    this.look([start, start + long]);
   }
 
   look([from, to]) {
