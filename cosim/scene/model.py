@@ -1,8 +1,10 @@
 """A whole scene, and its text."""
 
 import json
+import os
 from collections.abc import Sequence
 from math import ceil, inf
+from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -445,11 +447,12 @@ def schema() -> dict[str, Any]:
     return found | title
 
 
-def to_toml(scene: Scene, base: str = "") -> str:
+def to_toml(scene: Scene, base: str = "", folder: str | os.PathLike[str] | None = None) -> str:
     """The resolved scene as TOML: every key with its unit and meaning; loads to an equal scene.
 
     A key without a value, or set by a knob, is commented out. With the name of a built-in scene as
-    ``base`` all keys are: the file is then a template.
+    ``base`` all keys are: the file is then a template. Paths are those from a ``folder`` where it
+    is given, in which the file is to lie, and the files are near (:func:`_near`).
     """
     data = scene.as_dict()
     first = {"base": base} if base else {"name": scene.name}
@@ -460,14 +463,31 @@ def to_toml(scene: Scene, base: str = "") -> str:
         for key in (key for key in keys() if key.table == table):
             value = getattr(getattr(scene, table), key.name)
             mark = "" if key.name in data[table] and not base else "# "
+            if value is not None and (table, key.name) in PATHS:
+                value = _near(value, folder)
             shown = "" if value is None else toml_value(value)
             unit = "" if key.unit in ("", "1") else f"{key.unit}; "
             lines.append(f"{mark}{key.name} = {shown}  # {unit}{key.text}{_turned(scene, key)}")
     for table in PORT_LISTS:
         for each in scene.table(table):
+            if "file" in each:
+                each = each | {"file": _near(each["file"], folder)}
             lines += ["", f"[[{table}]]"]
             lines += [f"{key} = {toml_value(value)}" for key, value in each.items()]
     return "\n".join(lines) + "\n"
+
+
+def _near(path: str, folder: str | os.PathLike[str] | None) -> str:
+    """The path from a folder, if no more than two above it hold the file: what lies beside
+    ``results/NAME`` is moved to another machine together with it. Else, and where the folder is
+    reached by a link, from which ``..`` leads elsewhere, the path as it is."""
+    if folder is None or os.path.realpath(folder) != os.path.abspath(folder):
+        return path
+    try:
+        found = Path(os.path.relpath(path, folder))
+    except ValueError:  # another drive
+        return path
+    return path if found.parts[:3] == ("..",) * 3 else found.as_posix()
 
 
 def differing(scene: Scene) -> list[str]:

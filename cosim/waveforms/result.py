@@ -71,9 +71,10 @@ class Result:
             with open(table, "wb") as file:
                 csv(file, self.columns, self.units)
             run = identity.of_table(table)
+            about = self._attributes() | {"scene": to_toml(self.scene, folder=folder), "run": run}
             with open(waveforms, "wb") as file:
-                netcdf(file, self.columns, self.units, self._attributes() | {"run": run})
-            scene.write_text(to_toml(self.scene), encoding="utf-8")
+                netcdf(file, self.columns, self.units, about)
+            scene.write_text(about["scene"], encoding="utf-8")
             summary.write_text(as_json({"run": run, **self.summary}), encoding="utf-8")
         self.plot().write(figure, identity.in_figure(run))
 

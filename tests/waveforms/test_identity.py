@@ -56,6 +56,32 @@ def test_equal_runs_are_one(two: tuple[Path, Path], tmp_path: Path) -> None:
         formats.read(tmp_path)
 
 
+@pytest.mark.parametrize("link", [False, True])
+def test_a_run_is_moved_with_the_files_beside_it(tmp_path: Path, link: bool) -> None:
+    """From ``results`` that is a link, ``..`` would lead elsewhere: there the path stays whole."""
+    home = tmp_path / "home"
+    grip, folder = home / "own" / "grip.csv", home / "results" / "mine"
+    grip.parent.mkdir(parents=True)
+    grip.write_text("time [s],normal_force [N]\n0,0.5\n1,0.6\n")
+    if link:
+        (tmp_path / "disk").mkdir()
+        (home / "results").symlink_to(tmp_path / "disk")
+    run = cosim.run("ideal-current", {**SHORT, "friction.normal_force_file": str(grip)})
+    run.save(folder)
+    assert cosim.load(folder / "scene.toml") == run.scene
+    if link:
+        assert cosim.load(tmp_path / "disk" / "mine" / "scene.toml") == run.scene
+        return
+    home.rename(tmp_path / "moved")
+    moved = tmp_path / "moved" / "results" / "mine"
+    again = cosim.run(moved / "scene.toml")
+    assert again.scene.friction.normal_force_file == str(tmp_path / "moved" / "own" / "grip.csv")
+    assert again.columns["z_part"].tolist() == run.columns["z_part"].tolist()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", Note)
+        formats.read(moved)
+
+
 def test_a_kill_leaves_no_older_figure(
     two: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

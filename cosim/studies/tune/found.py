@@ -220,7 +220,8 @@ class Tuning:
                 path.unlink()
         for each in (self, *self.others):
             name = "best" if each is self else f"best-{each.waveform.replace(':', '-')}"
-            write_text(out / f"{name}.toml", to_toml(each.scene.model_copy(update=found)))
+            tuned = each.scene.model_copy(update=found)
+            write_text(out / f"{name}.toml", to_toml(tuned, folder=out))
         self.plot().write(out / "figure.png")
 
     def __repr__(self) -> str:
