@@ -406,7 +406,7 @@ def _tell_doubts(scene: Scene, layers: list[_Layer]) -> None:
     """
     origins = _origins(layers)
     chosen = scene.rung, scene.drive.waveform, METHODS[scene.coupling.method]
-    every = [k for k in keys() if k.default is not None and k.name not in KNOBS.values()]
+    every = [k for k in keys() if k.default is not None and k.name not in _TWINS.get(k.table, {})]
     silent = [
         layer.builtin or all(key.name in layer.tables.get(key.table, {}) for key in every)
         for layer in layers

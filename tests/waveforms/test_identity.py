@@ -56,6 +56,7 @@ def test_equal_runs_are_one(two: tuple[Path, Path], tmp_path: Path) -> None:
         formats.read(tmp_path)
 
 
+@pytest.mark.filterwarnings("error::cosim.errors.NoEffect")
 @pytest.mark.parametrize("link", [False, True])
 def test_a_run_is_moved_with_the_files_beside_it(tmp_path: Path, link: bool) -> None:
     """From ``results`` that is a link, ``..`` would lead elsewhere: there the path stays whole."""
