@@ -55,8 +55,9 @@ UNDERSTOOD = "; ".join(" or ".join(words) for words in WORDS.values()) + (
 MAP = "surface=NAME[:unit],part=NAME[:unit],time=NAME[:unit]"
 """The form of the assignment of columns; a unit may stand in the header instead."""
 HOW = (
-    "write what each is and its unit, such as time [s], surface [mm], part [mm], or, to compare, "
-    "name the columns, such as --columns time=t:s,surface=top:mm,part=cube:mm"
+    "write what each is and its unit, such as time [s] (of frames: time [1/960 s]), surface [mm], "
+    "part [mm], or, to compare, name the columns, such as --columns "
+    "time=t:s,surface=top:mm,part=cube:mm"
 )
 BODIES = {"p": "surface", "o": "part", "s": "plate"}
 TRIALS = {"t": "time"} | {
@@ -255,11 +256,15 @@ def _split(cell: str) -> tuple[str, str]:
 
 
 def _factor(where: str, unit: str, kind: str) -> float:
-    """The factor from a unit to SI; ``-mm`` is mm in a column that is positive downwards."""
+    """The factor from a unit to SI; ``-mm`` is mm in a column that is positive downwards, and
+    ``1/960 s`` the unit of a column that counts a camera's frames."""
     spelt = unit.translate(str.maketrans({"µ": "u", "μ": "u", "²": "2", "^": "", " ": ""}))
     found, factor = UNITS.get(spelt.removeprefix("-"), ("", 0.0))
+    if frames := re.fullmatch(r"1/([1-9]\d{0,8}(\.\d{1,9})?)s", spelt, re.ASCII):
+        found, factor = "s", 1.0 / float(frames[1])
     if found != kind:
         words = f"the unit {plain(unit, 40)} is not {kind}, m{kind}, µ{kind} or the like"
+        words += ", nor 1/960 s or the like for frames" * (kind == "s")
         raise BadInput(f"{where}: {words}.")
     return -factor if spelt.startswith("-") else factor
 

@@ -47,6 +47,18 @@ def test_names_and_units(header: str, signal: str, unit: float, tmp_path: Path) 
     assert found.notes == ()
 
 
+@pytest.mark.parametrize(
+    ("header", "asked"), [("time [1/240 s]", ""), ("frame", "time=frame:1/240 s")]
+)
+def test_frames_are_counted(header: str, asked: str, tmp_path: Path) -> None:
+    path = write(tmp_path / "a.csv", f"{header},surface [mm]", ROWS + 100.0, ROWS**2)
+    found = read_recording(path, asked)
+    np.testing.assert_allclose(found.time, ROWS / 240, atol=1e-15)
+    np.testing.assert_allclose(found.signals["v_surface"][1:-1], 2 * 0.24 * ROWS[1:-1])
+    with pytest.raises(BadInput, match=r"the unit 1/0 s is not s.*nor 1/960 s or the like"):
+        read_recording(path, f"time={header.split()[0]}:1/0 s")
+
+
 def test_velocities_of_uneven_heights_are_central_differences(tmp_path: Path) -> None:
     time = np.cumsum(1.0 + ROWS % 3)
     path = write(tmp_path / "a.csv", "time [ms],height [mm]", time, 3.0 * time)
