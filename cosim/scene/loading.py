@@ -127,6 +127,9 @@ def _layers(source: str) -> list[_Layer]:
         origin, path = plain(source), Path(source)
         data = _read(source, origin, builtin)
     name = re.sub(r"[^\w.+-]+", "-", path.stem).strip("-.+")[:64]
+    if not data:
+        words = "this file says nothing, so each key has its default"
+        warnings.warn(f"{origin}: {words}; cosim new writes one to begin with.", Note, stacklevel=3)
     data.setdefault("name", name or "scene")
     _check_names(data, origin)
     own = [circuits() / "ports", *compiled_fmus()] if source in builtin else []

@@ -263,6 +263,12 @@ def test_file_changes_only_its_keys(tmp_path: Path) -> None:
     assert scene.mechanics.model_copy(update={"travel": 1.9e-3}) == load("reference").mechanics
 
 
+def test_a_file_that_says_nothing_is_told(tmp_path: Path) -> None:
+    with pytest.warns(Note, match=r"mine\.toml: this file says nothing"):
+        scene = load(written(tmp_path, "# [drive]\n"))
+    assert scene == Scene(name="mine", description="")
+
+
 def test_file_on_a_base(tmp_path: Path) -> None:
     path = written(tmp_path, 'base = "gripper"\n[drive]\nfrequency = 30\n', "my scene.toml")
     scene, gripper = load(path), load("gripper")
