@@ -191,6 +191,15 @@ def test_heights_of_a_comparison_are_from_the_first_that_was_measured(tmp_path: 
     assert [each["most"] for each in shown["signals"]["columns"]] == [0.0, 0.25, 1.0, 9.0]
 
 
+def test_a_search_is_coloured_by_what_it_found(tmp_path: Path) -> None:
+    """And not by its third knob, whose greatest value stood out as the best."""
+    path = tmp_path / "tune.csv"
+    path.write_text("a [V],b [Hz],c [1],v_average,failure\n1,2,3,4,\n1,2,9,,too hot\n")
+    assert _table(path)[0]["cloud"]["ways"] == ["a", "b", "v_average"]
+    path.write_text("a [V],v_average,failure\n1,4,\n2,,too hot\n")
+    assert _table(path)[0]["cloud"]["ways"] == ["a", "v_average", "v_average"]
+
+
 def test_columns_of_one_name_in_two_units_are_two(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     rows = "time [s],z [mm],z [m],v [m/s],,\n0,1,0.001,7,,\n1,2,0.002,8,,\n"
