@@ -134,7 +134,7 @@ LONG = range(10_000_000_000)
     ("over", "more", "words"),
     [
         ({1: [2]}, {}, "--over: 1 must be a key"),
-        (["coil.count=1,2"], {}, "a sweep needs at least one key"),
+        (["coil.count=1,2"], {}, "a sweep needs at least one key and its values, such as --over"),
         ({"coil.count": 2}, {}, '--over: "coil.count" must be a key, 2 its numbers'),
         ({"coil.count": "12"}, {}, '"12" its numbers'),
         ({"coil.count": ["a"]}, {}, '"a" must be a whole number from 1 to 16'),
@@ -210,7 +210,7 @@ def test_tune_theory_and_compare(tmp_path: Path, result: cosim.Result) -> None:
     again = cosim.run(tuning.scene).summary["v_average"]
     assert again == pytest.approx(tuning.best.value, rel=1e-6)
     tuning.save(tmp_path / "tune")
-    with pytest.raises(cosim.BadInput, match="either maximise or minimise"):
+    with pytest.raises(cosim.BadInput, match=r"either maximise or minimise.*such as v_average"):
         cosim.tune("ideal-current", over=over)
     assert cosim.theory().numbers["up"]["v_average_over_gT"] == pytest.approx(0.31065088757)
     with pytest.raises(cosim.BadInput, match="too small"):

@@ -211,7 +211,8 @@ def _header(cells: Cells, tracker: bool, asked: str) -> tuple[dict[str, Column],
     if unknown and "time" not in known:
         raise BadInput(f"{where}: which column is the time is not clear ({left_out}): {HOW}.")
     note = f"Left out{'' if asked else ', not understood'}: {left_out}."
-    note += "" if asked else f" Understood are: {UNDERSTOOD}."
+    hint = f" Understood are: {UNDERSTOOD}. To compare, --columns surface=NAME names others."
+    note += "" if asked else hint
     return known, heads, (note,) if unknown else ()
 
 

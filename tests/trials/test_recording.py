@@ -76,6 +76,7 @@ def test_what_is_taken_for_granted_is_told(tmp_path: Path) -> None:
     header = "time [s],velocity [m/s],temperature [K]"
     (unknown,) = read_recording(write(tmp_path / "b.csv", header, ROWS, ROWS, ROWS)).notes
     assert unknown.startswith("Left out, not understood: temperature [K]. Understood are: time;")
+    assert unknown.endswith("To compare, --columns surface=NAME names others.")
 
 
 def test_rounded_times_of_a_trial_are_made_even(tmp_path: Path) -> None:

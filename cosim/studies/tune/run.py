@@ -102,7 +102,8 @@ def tune(
     """
     quantity, largest = maximise or minimise, minimise is None
     if not isinstance(quantity, str) or (maximise and minimise):
-        raise BadInput("tune: either maximise or minimise must name a number of the summary.")
+        words = "must name a number of the summary, such as v_average"
+        raise BadInput(f"tune: either maximise or minimise {words}.")
     scene = load(scene, overrides)
     check_seed(seed)
     if not over and not waveform and scene.drive.waveform not in COMMANDS:
