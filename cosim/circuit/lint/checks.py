@@ -143,7 +143,8 @@ def _check_type(element: Element, model: str, types: set[str]) -> None:
 def _check_passive(element: Element, scope: Scope, names: Names) -> None:
     if any(word.partition("=")[0] not in _NO_VALUES for word in element.words if "=" in word):
         if match := _BARE.search(unbraced(element.line.text)):
-            element.refuse(f": write {{…}} around its value, {shown(match[1].strip())}")
+            value = element.line.text[slice(*match.span(1))].strip()
+            element.refuse(f": write {{…}} around its value, {shown(value)}")
         return
     first = next((word for word in element.words if "=" not in word), None)
     if first is None:

@@ -81,6 +81,7 @@ _COMMAND_COMMENT = re.compile(r"\*\s*(?:#\s*[\w!/.]|ng_script)", re.IGNORECASE)
 _TRAILING = re.compile(r";|//|(?:^|(?<=[\s,]))\$")  # begins a comment; "$" only between words
 _NUMBERED = re.compile(r"(?<![\w.])\$(?=n_\d)", re.IGNORECASE)  # begins PSpice's own nodes
 # A name, perhaps with "=" and a value in braces, quotes or bare, or with a number.
+_VALUE = re.compile(r"\{[^{}]*\}|'[^']*'|[+-]?[\d.][\w.+-]*")
 _OPTION = re.compile(
     r"([a-z_]\w*)(?:\s*=\s*(\{[^{}]*\}|'[^']*'|[\w.+-]+)|\s+([\d.][\w.+-]*))?[\s,]*", re.IGNORECASE
 )
@@ -425,6 +426,10 @@ def passed(line: Line) -> str | None:
     if found := _FILE_WORD.search(line.text):
         cure = "a netlist may not name files; write the values of this one into the line"
         refuse(line, f"{shown(found[0])} is not allowed, as {cure}")
+    if word == ".temp" and not _VALUE.fullmatch(rest.lstrip("= ")):
+        one = "must have one temperature in °C, a number or {…}"
+        cure = "for several write {NAME}, and sweep over circuit.param.NAME"
+        refuse(line, f".temp {shown(rest)}".rstrip() + f" {one}; {cure}")
     if word in (".options", ".option", ".opt"):
         return _options(line, word, rest)
     if word == ".model":
@@ -448,6 +453,8 @@ def _options(line: Line, word: str, rest: str) -> str | None:
             refuse(line, f"{shown(rest[place:])} is no option")
         name = match[1].lower()
         if name in NUMERIC_OPTIONS:
+            if match[2] and name != "method" and not _VALUE.fullmatch(match[2]):
+                refuse(line, f"{shown(match[0].strip())} must have a number, or a name in {{…}}")
             kept.append("=".join(filter(None, match.groups())))
         elif name not in DROPPED_OPTIONS and not name.startswith("dig"):
             refuse(line, f"the option {shown(name)} is not allowed in a netlist; leave it out")

@@ -154,6 +154,7 @@ _UNSIGNED = ("", *"0123456789.")
 _NAMING = re.compile(r"[\w.$#]")
 # An operator, a sign, and the exponent: group 3 has it if it is even, else it is a name or number.
 _POWER = re.compile(r"(\s*(?:\*\*|\^)\s*)([+-]?)(?:(\d*[02468])(?![\w.])|[\w.]*)")
+_BEFORE = re.compile(r"(?<=[\w)}])\s*(?:\*\*|\^)\s*[+-]?$")  # powers are computed from the left
 _LOGIC = re.compile(r"(?<!&)&(?!&)|(?<!\|)\|(?!\|)|~")
 _LOGICAL = {"&": "&&", "|": "||", "~": "!"}
 """LTspice's and, or, not."""
@@ -430,10 +431,12 @@ def _powers(text: str) -> str:
     place = 0
     while match := _POWER.search(text, place):
         start = place = match.start()
-        depth = 0  # Backwards to the start of the base: a name, number, bracket or call.
+        depth = 0  # Backwards to the start of the base: a name, number, bracket, call or power.
         while start and (depth or text[start - 1] in ")}" or _NAMING.match(text[start - 1])):
             start -= 1
             depth += (text[start] in ")}") - (text[start] in "({")
+            if not depth and (before := _BEFORE.search(text, max(0, start - 20), start)):
+                start = before.start()
         end = match.end()
         if text[end : end + 1] in ("(", "{"):
             end = closing(text, end)
