@@ -61,9 +61,10 @@ def refuse_unknown(scene: Scene, names: Iterable[str]) -> None:
     from cosim.circuit.lint.deck import read
     from cosim.circuit.lint.elements import parse
     from cosim.circuit.netlist import path_of
-    from cosim.simulation.elsewhere import bounds
+    from cosim.simulation.elsewhere import bounds, refuse_missing
     from cosim.toolchain.processes import isolated
 
+    refuse_missing(scene)
     scene = changed(scene, dict.fromkeys(own, 0.0), "--over")
     if scene.circuit.param and not scene.rung.ngspice:
         raise BadInput(

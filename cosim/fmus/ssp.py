@@ -42,16 +42,16 @@ def ssp(scene: Scene, target: Path, fmi: int = 2) -> None:
     inputs that an .ssp cannot hold."""
     if scene.has_ports or not scene.rung.ngspice:
         raise BadInput(
-            f"scene {scene.name}: an .ssp is of the built-in machine with a circuit in ngspice: "
+            f"{scene.origin}: an .ssp is of the built-in machine with a circuit in ngspice: "
             'circuit.model must be "amplifier", "full" or "file", without an [[fmu]].'
         )
     if scene.renamed or scene.coupling.method == "companion":
         raise BadInput(
-            f"scene {scene.name}: an .ssp has a netlist with sources Vcommand and Vemf, without "
+            f"{scene.origin}: an .ssp has a netlist with sources Vcommand and Vemf, without "
             '[[port]], and another coupling.method than "companion".'
         )
     if scene.friction.normal_force_file or scene.drive.phase_deg is not None:
-        raise BadInput(f"scene {scene.name}: an .ssp has one surface and a constant normal_force.")
+        raise BadInput(f"{scene.origin}: an .ssp has one surface and a constant normal_force.")
     with tempfile.TemporaryDirectory(prefix="ssp-") as name:
         folder = Path(name)
         vectors = {"current": f"v({_CURRENT})"}
@@ -94,7 +94,7 @@ def _points(scene: Scene, column: str) -> list[tuple[float, float]]:
         found += zip(t[same:].tolist(), values[same:], strict=True)  # without a repeated point
         if len(found) > _MOST:
             raise BadInput(
-                f"scene {scene.name}: its drive has more than {_MOST} corners; a shorter "
+                f"{scene.origin}: its drive has more than {_MOST} corners; a shorter "
                 "run.duration or drive.quantised = false helps."
             )
     return found

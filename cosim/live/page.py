@@ -50,14 +50,14 @@ def opened(scene: str, overrides: Iterable[str] = ()) -> tuple[str, dict[str, di
     if not rigs.fits(found):
         known = ", ".join(rigs.scenes())
         raise BadInput(
-            f"scene {found.name}: the page runs {known}, and such as these: a free ram, its "
+            f"{found.origin}: the page runs {known}, and such as these: a free ram, its "
             "drive from time 0 on, and no [[port]], own file, DAC steps, PWM ripple or "
             "drive.phase_deg."
         )
     link, known = to_link(found), rigs.turned()
     for key in (pair.partition("=")[0] for pair in link.split("&")[1:]):
         if key not in known and not key.startswith(("run.", "coupling.")):
-            raise BadInput(f"scene {found.name}: the page cannot turn {plain(key)}.")
+            raise BadInput(f"{found.origin}: the page cannot turn {plain(key)}.")
     return link, circuits
 
 

@@ -82,7 +82,7 @@ def load(source: "Scene | str | os.PathLike[str]", overrides: Overrides | None =
     Raises :class:`BadInput` with one sentence on the first thing that is wrong.
     """
     if isinstance(source, Scene):
-        layers = [_Layer(f"scene {source.name}", source.as_dict())]
+        layers = [_Layer(source.origin, source.as_dict())]
     else:
         if not isinstance(source, str | bytes | os.PathLike):
             raise BadInput(f"{messages.shown(source)}: must be a scene, or the name of one.")
@@ -99,7 +99,7 @@ def load(source: "Scene | str | os.PathLike[str]", overrides: Overrides | None =
         layers.append(changes)
     scene = _checked(layers, base)
     _tell_doubts(scene, layers)
-    return scene
+    return scene.of(base)
 
 
 def changed(scene: Scene, values: Mapping[str, float | int | str | None], origin: str) -> Scene:
@@ -111,9 +111,10 @@ def changed(scene: Scene, values: Mapping[str, float | int | str | None], origin
     # A table that stays the same is not checked again, but the scene as a whole is.
     below = {name: scene.table(name) for name in layer.tables}
     try:
-        return Scene.model_validate(vars(scene) | _merge([_Layer("", below), layer]))
+        made = Scene.model_validate(vars(scene) | _merge([_Layer("", below), layer]))
     except ValidationError:
-        return _checked([_Layer(f"scene {scene.name}", scene.as_dict()), layer], origin)
+        made = _checked([_Layer(scene.origin, scene.as_dict()), layer], origin)
+    return made.of(scene.origin)
 
 
 def _layers(source: str) -> list[_Layer]:
@@ -175,7 +176,7 @@ def to_link(scene: Scene) -> str:
             warnings.simplefilter("ignore", NoEffect)
             if _plain_values(load(made)) == wanted:
                 return made
-    raise BadInput(f"scene {scene.name}: no link makes it, for example since it names files.")
+    raise BadInput(f"{scene.origin}: no link makes it, for example since it names files.")
 
 
 def _plain_values(scene: Scene) -> dict[str, Any]:

@@ -3,11 +3,12 @@
 import json
 import os
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from math import ceil, inf
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
 from cosim.scene import firmware
 from cosim.scene.describe import KEYS, Key, keys
@@ -84,6 +85,13 @@ def periods_for(length: float, *times: float) -> list[int]:
     return [max(1, ceil(time / length - 1e-9)) for time in times]
 
 
+@dataclass(frozen=True)
+class Origin:
+    """Where a scene is from; equal scenes may be from different files."""
+
+    words: str = field(default="", compare=False)
+
+
 class Scene(BaseModel):
     """Everything that a run needs to know, checked; frozen and comparable."""
 
@@ -100,6 +108,7 @@ class Scene(BaseModel):
     run: Run = Run()
     fmu: list[Fmu] = Field(default_factory=list, max_length=64)
     port: list[Port] = Field(default_factory=list, max_length=1024)
+    _origin: Origin = PrivateAttr(Origin())
 
     @model_validator(mode="before")
     @classmethod
@@ -350,6 +359,16 @@ class Scene(BaseModel):
                 f"for its offset pin gives 0 to {firmware.V_REFERENCE} V",
                 *others,
             )
+
+    @property
+    def origin(self) -> str:
+        """The file that the scene is from, or its name, as messages begin with it."""
+        return self._origin.words or f"scene {self.name}"
+
+    def of(self, origin: str) -> "Scene":
+        """This scene, with another :attr:`origin`."""
+        self._origin = Origin(origin)
+        return self
 
     @property
     def period(self) -> float:

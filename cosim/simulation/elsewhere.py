@@ -4,6 +4,7 @@ Modules that only the worker needs are imported there, since their import takes 
 """
 
 import os
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,17 +26,16 @@ from cosim.waveforms.result import Result
 def one_run(scene: Scene, progress: Progress, alone: bool = False) -> Result:
     """The result of :func:`cosim.simulation.here.simulate_here`, in this process or a worker.
     Raises SimulationFailed also where the worker dies or hangs."""
-    for key, path in scene.files.items():
-        if not os.path.exists(path) and (key != "circuit.netlist" or scene.rung.own_netlist):
-            words = f'{plain(key)} = "{plain(path)}": there is no such file'
-            raise BadInput(f"scene {scene.name}: {words}.")
+    refuse_missing(scene)
     if in_a_worker() or not scene.rung.ngspice:
         from cosim.simulation.here import simulate_here
 
-        return simulate_here(scene, progress, alone)
+        with _told(scene):
+            return simulate_here(scene, progress, alone)
     ends: list[str] = []
     try:
-        ran = isolated(_worked, (scene, alone), progress, bounds(scene), ends.append)
+        with _told(scene):
+            ran = isolated(_worked, (scene, alone), progress, bounds(scene), ends.append)
     except ProcessLost as lost:
         if not scene.fmu:
             raise
@@ -50,6 +50,26 @@ def one_run(scene: Scene, progress: Progress, alone: bool = False) -> Result:
         )
     progress(scene.run.duration)
     return Result(scene, *ran)
+
+
+def refuse_missing(scene: Scene) -> None:
+    """Raise BadInput for a file that the scene names and that is not there."""
+    for key, path in scene.files.items():
+        if not os.path.exists(path) and (key != "circuit.netlist" or scene.rung.own_netlist):
+            words = f'{plain(key)} = "{plain(path)}": there is no such file'
+            raise BadInput(f"{scene.origin}: {words}.")
+
+
+@contextmanager
+def _told(scene: Scene) -> Iterator[None]:
+    """Within this context a BadInput names the scene, too, unless it names a netlist's line: ports,
+    ``circuit.save`` and parameters are checked where netlist and FMUs are read."""
+    try:
+        yield
+    except BadInput as error:
+        if not scene.rung.own_netlist or re.match(r".*?:\d+: ", str(error)):
+            raise
+        raise BadInput(f"{scene.origin}: {error}") from error
 
 
 @contextmanager

@@ -82,7 +82,7 @@ def test_a_wrong_port_is_told_in_one_sentence(
     with in_place():
         assert main(["run", str(scene), "--out", str(tmp_path / "out")]) == 2
     told = capsys.readouterr().err.strip()
-    assert told.count("\n") == 0 and told.startswith("cosim: ")
+    assert told.count("\n") == 0 and told.startswith(f"cosim: {scene}: ")
     assert re.search(said, told), told
     assert not (tmp_path / "out").exists()
 
@@ -139,6 +139,28 @@ def test_what_ngspice_cannot_read_has_nothing_to_do_with_steps(tmp_path: Path) -
     with in_place(), pytest.raises(SimulationFailed, match=r"t = 0 s.*not parsed") as told:
         run(scene)
     assert "max_step" not in str(told.value)
+
+
+def test_a_line_of_the_netlist_is_told_by_its_own_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene, netlist = motor(tmp_path), tmp_path / "bridge.cir"
+    netlist.write_text(netlist.read_text().replace("Rm a x 1", "Rm a x"))
+    with in_place():
+        assert main(["run", str(scene)]) == 2
+    assert re.match(r"cosim: bridge\.cir:\d+: rm ", capsys.readouterr().err)
+
+
+@pytest.mark.parametrize("missing", ["Rotor.fmu", "bridge.cir"])
+def test_a_sweep_over_a_parameter_tells_a_missing_file_as_a_run_does(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], missing: str
+) -> None:
+    scene = motor(tmp_path)
+    (tmp_path / missing).unlink()
+    for command in (["run", str(scene)], ["sweep", str(scene), "--over", "fmu.rotor.J=1,2"]):
+        assert main([*command, "--out", str(tmp_path / "out")]) == 2
+        told = capsys.readouterr().err
+        assert re.match(rf'cosim: {scene}: \S+ = "\S+{missing}": there is no such file\.$', told)
 
 
 KIND = (

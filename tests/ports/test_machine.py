@@ -185,6 +185,7 @@ def test_what_is_wrong_is_told(folder: Path, capsys: pytest.CaptureFixture[str],
         assert main(["run", str(folder / "own.toml"), "--out", str(folder / "o")]) == 2
     told = [line for line in capsys.readouterr().err.splitlines() if "note" not in line]
     assert len(told) == 1 and said in told[0], told
+    assert told[0].startswith(f"cosim: {folder / 'own.toml'}: ")
 
 
 BRIDGE = """A class-D bridge with a carrier of 20 kHz

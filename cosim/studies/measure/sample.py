@@ -195,7 +195,7 @@ def sample(
     own |= {name: candidates for name, (candidates, _) in found.items()}
     for name, (_, speed) in found.items():
         if not speed > 0.0:
-            raise BadInput(f"scene {scene.name}: {name}: no setting of the knobs moves it upwards.")
+            raise BadInput(f"{scene.origin}: {name}: no setting of the knobs moves it upwards.")
     told("the scene's own rig")
     targets, values = [], []
     for number, rig in enumerate(rigs):

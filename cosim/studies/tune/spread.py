@@ -140,7 +140,7 @@ def turns(scene: Scene) -> list[Settings]:
     Raises BadInput for a scene whose knobs move nothing.
     """
     if scene.has_ports:
-        raise BadInput(f"scene {scene.name}: --spread turns knobs of the built-in machine.")
+        raise BadInput(f"{scene.origin}: --spread turns knobs of the built-in machine.")
     if not scene.rung.driven:
         raise BadInput(
             f'scene {scene.name}: circuit.model = "{scene.circuit.model}" has no knobs that '
