@@ -25,7 +25,8 @@ OWN = "own "
 """Before a user's word in the log, as a netlist's own node may be called like the machine's."""
 OPTIONAL = ("v1", "swing", "climit", "slewing")
 """Nodes that are read where a netlist has them: the command at the power amplifier's input, and one
-for each limit, which acts while the node's magnitude is at least 0.5 V."""
+for each limit, which acts while the node's magnitude is at least 0.5 V. Where ports name other
+sources than the machine's they are the netlist's own."""
 
 MOTIONAL = "v(motional)"
 """With the method "companion": the part of the back-EMF that the circuit itself integrates, V."""
@@ -79,6 +80,8 @@ def prepare(scene: Scene) -> tuple[str, dict[str, str]]:
     title, elements = netlist.title, netlist.top.elements
     external = _external_sources(elements, scene.renamed)
     present = {node for element in elements for node in element.nodes}
+    names = {element.name for element in elements}
+    own_form = not scene.renamed or any(names.issuperset(each) for each in AGREED)
     companion = scene.coupling.method == "companion"
     if companion:
         emf = scene.renamed.get("machine.back_emf", "vemf").lower()
@@ -91,7 +94,7 @@ def prepare(scene: Scene) -> tuple[str, dict[str, str]]:
             port = f', or a [[port]] to "machine.{node}"' if scene.renamed else ""
             refuse(title, f"the netlist must have a node {node}, one of the coil's two ends{port}")
     saved = {name: name for name in REQUIRED}
-    saved |= {f"v({name})": f"v({name})" for name in OPTIONAL if name in present}
+    saved |= {f"v({name})": f"v({name})" for name in OPTIONAL if own_form and name in present}
     if companion:
         saved[MOTIONAL] = MOTIONAL
     vectors = dict(zip(netlist.words, reading(netlist.words), strict=True))

@@ -102,10 +102,11 @@ def test_what_is_saved_of_it_is_in_the_waveforms(folder: Path) -> None:
 
 
 def test_a_node_called_as_the_machine_calls_its_own_stays_the_netlists(tmp_path: Path) -> None:
-    """The coil is between ``hot`` and ground, ``out`` is before half an ohm, ``v1`` a supply."""
+    """The coil is between ``hot`` and ground, ``out`` is before half an ohm, ``v1``, ``swing``,
+    ``climit`` and ``slewing`` are supplies, no limits at work."""
     (tmp_path / "own.cir").write_text(
-        "t\nVin in 0 0\nVone v1 0 12\nEout out 0 in 0 1\nRs out hot 0.5\nRc hot c1 7.1\n"
-        "Lc c1 c2 1.2m\nVmot c2 0 0\n.meas tran top max v(out)\n.end\n"
+        "t\nVin in 0 0\nVone v1 0 12\nVs swing 0 5\nVl climit 0 5\nVw slewing 0 5\n"
+        "Eout out 0 in 0 1\nRs out hot 0.5\nRc hot c1 7.1\nLc c1 c2 1.2m\nVmot c2 0 0\n.meas tran top max v(out)\n.end\n"
     )
     scene = OWN.replace('"v(left)", "v(hot,shunt)*i(Vmot)"', '"v(out)"') + ENDS + RUN
     (tmp_path / "own.toml").write_text(scene.replace('"v(shunt)"', '"0"'))
@@ -115,6 +116,8 @@ def test_a_node_called_as_the_machine_calls_its_own_stays_the_netlists(tmp_path:
     before = waves["coil_voltage"] + 0.5 * waves["current"]
     assert waves["v(out)"] == pytest.approx(before, abs=1e-6)
     assert waves["command"] == pytest.approx(waves["v(out)"], abs=1e-3)
+    limits = {"swing_high_fraction", "current_limit_fraction", "slew_fraction"}
+    assert not limits & result.summary.keys()
     assert result.summary["meas.top"] == pytest.approx(waves["v(out)"].max(), rel=1e-2)
 
 
