@@ -35,9 +35,6 @@ from cosim.scene.tables import (
 
 _LIBRARY = Path(__file__).with_name("library")
 
-MOST_TOLD = 5
-"""Most unknown names of a file that one message tells."""
-
 
 @dataclass(frozen=True)
 class _Layer:
@@ -79,7 +76,7 @@ def load(source: "Scene | str | os.PathLike[str]", overrides: Overrides | None =
 
     A file may name a built-in scene as its ``base``; each layer changes only the keys that it
     gives. A knob of the device replaces its value from the layers below, and the other way round.
-    Raises :class:`BadInput` with one sentence on the first thing that is wrong.
+    Raises :class:`BadInput` with a sentence on each of the first things that are wrong.
     """
     if isinstance(source, Scene):
         layers = [_Layer(source.origin, source.as_dict())]
@@ -217,7 +214,7 @@ def _read(source: str, origin: str, builtin: list[str]) -> dict[str, Any]:
 
 
 def _check_names(data: dict[str, Any], origin: str) -> None:
-    told = " ".join(map(messages.ended, islice(_unknown(data, origin), MOST_TOLD)))
+    told = " ".join(map(messages.ended, islice(_unknown(data, origin), messages.MOST_TOLD)))
     if told:
         raise BadInput(f"{origin}: {told.replace(' there is no', ' There is no')}")
 
@@ -228,7 +225,7 @@ def _unknown(data: dict[str, Any], origin: str) -> Iterator[str]:
         if name in ("name", "description", "base"):
             continue
         if name in PORT_LISTS:
-            _check_list(name, content, origin)
+            yield from _unknown_in_list(name, content, origin)
             continue
         if name not in TABLES:
             yield messages.unknown_table(name)
@@ -242,9 +239,9 @@ def _unknown(data: dict[str, Any], origin: str) -> Iterator[str]:
                 yield messages.unknown_key(name, key)
 
 
-def _check_list(name: str, content: Any, origin: str) -> None:
-    """Check the names of keys in ``[[fmu]]`` and ``[[port]]``. An override has parameters of FMUs
-    instead, ``{"name.parameter": value}``, which pass."""
+def _unknown_in_list(name: str, content: Any, origin: str) -> Iterator[str]:
+    """A sentence on each key of ``[[fmu]]`` or ``[[port]]`` that is not known. An override has
+    parameters of FMUs instead, ``{"name.parameter": value}``, which pass."""
     if name == "fmu" and isinstance(content, dict) and all("." in key for key in content):
         return
     if not (isinstance(content, list) and all(isinstance(each, dict) for each in content)):
@@ -253,7 +250,7 @@ def _check_list(name: str, content: Any, origin: str) -> None:
     known = [field.alias or key for key, field in PORT_LISTS[name].model_fields.items()]
     for key in (key for each in content for key in each if key not in known):
         hint = messages.suggestion(key, known) or f" (keys: {', '.join(known)})"
-        raise messages.bad(f'{origin}: there is no key "{plain(key)}" in [[{name}]]{hint}')
+        yield f'there is no key "{plain(key)}" in [[{name}]]{hint}'
 
 
 def _parsed(overrides: Iterable[str]) -> Iterator[tuple[str, Any]]:

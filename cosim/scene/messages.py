@@ -2,6 +2,7 @@
 
 import difflib
 from collections.abc import Iterable, Mapping
+from itertools import islice
 from typing import Any
 
 from pydantic import ValidationError
@@ -17,6 +18,9 @@ ALLOWED_TOP = {
     "description": "one line of at most 200 characters",
 }
 ALLOWED_START = "a number, true, false or a text"
+MOST_TOLD = 5
+"""Most faults of a scene that one message tells."""
+
 PLAIN_NUMBER = "a number without suffix or unit, such as 3e3"
 
 
@@ -104,43 +108,55 @@ def idle(key: Key, rung: Rung, waveform: str, method: CouplingMethod) -> str:
 
 
 def explain(error: ValidationError, origins: Mapping[str, tuple[int, str]], default: str) -> str:
-    """The first error in one sentence, with the layer (file or option) that brought it in.
+    """The first errors, at most :data:`MOST_TOLD`, in a sentence each, with the layers (files or
+    options) that brought them in.
 
     ``origins`` gives, for each "table.key" that was set, the rank and the name of its layer.
     """
-    first: Any = error.errors(include_url=False)[0]
+    told: dict[str, tuple[str, str]] = {}
+    for each in error.errors(include_url=False):
+        origin, sentence = _explained(each, origins, default)
+        told.setdefault(sentence.partition(" = ")[0], (origin, ended(sentence)))  # once for a list
+    said, last = "", None
+    for origin, sentence in islice(told.values(), MOST_TOLD):
+        said += f" {sentence}" if origin == last else f" {origin}: {sentence}"
+        last = origin
+    return said.strip()
+
+
+def _explained(first: Any, origins: Mapping[str, tuple[int, str]], default: str) -> tuple[str, str]:
+    """The layer that brought in an error, and a sentence on it."""
     if first["type"] == "check":
         layers = [origins[key] for key in first["ctx"]["keys"] if key in origins]
-        origin = max(layers)[1] if layers else default
-        return f"{origin}: {ended(first['ctx']['sentence'])}"
+        return max(layers)[1] if layers else default, first["ctx"]["sentence"]
     if first["loc"][0] in PORT_LISTS:
-        return _of_list(first, origins.get(first["loc"][0], (0, default))[1])
+        return origins.get(first["loc"][0], (0, default))[1], _of_list(first)
     full = ".".join(str(part) for part in first["loc"][:2])  # not the place in a list
     if full == "circuit.param" and len(first["loc"]) > 2:
         name = f"{full}.{first['loc'][2]}"
         origin = origins.get(name, origins.get(full, (0, default)))[1]
-        return f"{origin}: {plain(name)} = {shown(first['input'])} must be {PLAIN_NUMBER}."
+        return origin, f"{plain(name)} = {shown(first['input'])} must be {PLAIN_NUMBER}"
     key = KEYS.get(full)
     allowed = key.allowed if key else ALLOWED_TOP.get(full, "a table")
     hint = suggestion(shown(first["input"]).strip('"'), map(str, (key and key.choices) or ()))
     origin = origins.get(full, (0, default))[1]
-    return ended(f"{origin}: {full} = {shown(first['input'])} must be {allowed}{hint}")
+    return origin, f"{full} = {shown(first['input'])} must be {allowed}{hint}"
 
 
-def _of_list(fault: Any, origin: str) -> str:
+def _of_list(fault: Any) -> str:
     """A sentence on a key of ``[[fmu]]`` or ``[[port]]``."""
     table, *place = fault["loc"]
     if len(place) < 2:
-        return f"{origin}: [[{table}]] is given too often."
+        return f"[[{table}]] is given too often"
     fields = PORT_LISTS[table].model_fields
     key = next(name for name, each in fields.items() if place[1] in (name, each.alias))
     allowed = described(table, key).allowed
-    what = f"{origin}: [[{table}]] {place[0] + 1}: {place[1]}"
+    what = f"[[{table}]] {place[0] + 1}: {place[1]}"
     if len(place) > 2:
         what, allowed = f"{what}.{plain(place[2])}", ALLOWED_START
         if isinstance(fault["input"], dict) and fault["input"]:
             inner = next(iter(fault["input"]))
             allowed += f'; write a name with dots in quotes, "{plain(f"{place[2]}.{inner}")}"'
     if fault["type"] == "missing":
-        return f"{what} is missing; it must be {allowed}."
-    return ended(f"{what} = {shown(fault['input'])} must be {allowed}")
+        return f"{what} is missing; it must be {allowed}"
+    return f"{what} = {shown(fault['input'])} must be {allowed}"

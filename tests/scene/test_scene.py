@@ -1,5 +1,6 @@
 """Scenes: defaults, layers, overrides, knobs, and the way to text and back."""
 
+import re
 import subprocess
 import sys
 import tempfile
@@ -251,6 +252,28 @@ def test_all_unknown_names_are_told_at_once(tmp_path: Path) -> None:
         f'{path}: there is no key "drive.frequncy"; did you mean drive.frequency? There is no key '
         '"drive.amplitud"; did you mean drive.amplitude? There is no table "cirucit"; did you mean '
         "circuit?"
+    )
+
+
+def test_unknown_names_in_lists_are_told_with_the_others(tmp_path: Path) -> None:
+    path = written(tmp_path, '[[port]]\nform = "a"\nsorce = "V1"\n[drvie]\n')
+    with pytest.raises(BadInput) as caught:
+        load(path)
+    assert re.findall(r"did you mean (\w+)\?", str(caught.value)) == ["from", "source", "drive"]
+
+
+def test_the_first_five_wrong_values_are_told_at_once_with_their_layers(tmp_path: Path) -> None:
+    path = written(
+        tmp_path,
+        "[drive]\ntable = [1, 'b']\nfrequency = -1\n[[fmu]]\nfile = 'r'\n[run]\nduration = 0\n",
+    )
+    with pytest.raises(BadInput) as caught:
+        load(path, ["drive.offset=x", "coil.inductance=x"])
+    assert str(caught.value) == (
+        f"{path}: drive.table = 1 must be a list of 1 to 64 pairs of numbers, [[phase, level], "
+        "...]. drive.frequency = -1 must be a number from 0.01 to 100000 Hz. --set: drive.offset = "
+        '"x" must be a number from -100 to 100 V. coil.inductance = "x" must be a number from '
+        f"1e-09 to 1000 H. {path}: run.duration = 0 must be a number from 1e-06 to 100000 s."
     )
 
 
