@@ -106,7 +106,8 @@ def test_a_node_called_as_the_machine_calls_its_own_stays_the_netlists(tmp_path:
     ``climit`` and ``slewing`` are supplies, no limits at work."""
     (tmp_path / "own.cir").write_text(
         "t\nVin in 0 0\nVone v1 0 12\nVs swing 0 5\nVl climit 0 5\nVw slewing 0 5\n"
-        "Eout out 0 in 0 1\nRs out hot 0.5\nRc hot c1 7.1\nLc c1 c2 1.2m\nVmot c2 0 0\n.meas tran top max v(out)\n.end\n"
+        "Eout out 0 in 0 1\nRs out hot 0.5\nRc hot c1 7.1\nLc c1 c2 1.2m\nVmot c2 0 0\n"
+        ".meas tran top max v(out)\n.end\n"
     )
     scene = OWN.replace('"v(left)", "v(hot,shunt)*i(Vmot)"', '"v(out)"') + ENDS + RUN
     (tmp_path / "own.toml").write_text(scene.replace('"v(shunt)"', '"0"'))
