@@ -88,14 +88,17 @@ static int step_by(Run *run, double h)
     const double *p = run->v;
     State *s = run->state;
     const double fastest = sqrt(p[STOP] / p[MASS]) + (p[DAMPING] + p[STOP_DAMPING]) / p[MASS];
-    const int n = 1 + (int)(h * fastest / 0.05);
+    const double n = 1.0 + floor(h * fastest / 0.05);
     h /= n;
-    for (int k = 0; k < n; k++) { /* Runge and Kutta's, of order 4 */
+    for (double k = 0.0; k < n; k++) { /* Runge and Kutta's, of order 4 */
+        const State before = *s;
         const State a = rates(p, *s), b = rates(p, moved(*s, a, h / 2.0));
         const State c = rates(p, moved(*s, b, h / 2.0)), d = rates(p, moved(*s, c, h));
         s->x += h / 6.0 * (a.x + 2.0 * b.x + 2.0 * c.x + d.x);
         s->v += h / 6.0 * (a.v + 2.0 * b.v + 2.0 * c.v + d.v);
         s->flux += h * p[VOLTAGE];
+        if (s->x == before.x && s->v == before.v && s->flux == before.flux)
+            break; /* it rests, so further steps change nothing */
     }
     show(run);
     return 1;

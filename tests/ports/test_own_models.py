@@ -1,6 +1,7 @@
 """Models in C with ``fmu/thin``, joined by ports: what they are given, in closed form."""
 
 import subprocess
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
@@ -8,6 +9,8 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 
+from cosim.coupling.ports.strangers import stranger
+from cosim.files.resources import compiled_fmus
 from cosim.fmus.pack import pack
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
@@ -190,3 +193,13 @@ def test_what_it_feeds_through_is_said(tmp_path: Path, library: Path) -> None:
     result = run(tmp_path, library, ports, {}, "", rc)
     assert result.summary["method"] == "redo"
     assert result.summary["i(Vx).mean"] == pytest.approx(1.0 / 3e3, rel=1e-4)
+
+
+@pytest.mark.parametrize("h", [100.0, 1e7])
+def test_a_step_of_any_length_ends_where_the_jaw_rests(h: float) -> None:
+    """2 N/A press the spring. More of its own steps than an int holds lead through 1e7 s."""
+    jaw = stranger(str(compiled_fmus()[0] / "jaw"))
+    with closing(jaw.instance({"current": 0.6})) as made:
+        made.raw.doStep(0.0, h)
+        (force,) = made.raw.getFloat64([jaw.variables["normal_force"].reference])
+    assert force == pytest.approx(1.2, rel=1e-9)
