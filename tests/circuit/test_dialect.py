@@ -964,7 +964,9 @@ def test_faults_of_a_library_matter_where_they_are_used(
     (tmp_path / "part.lib").write_bytes(FAULTY.encode())
     text = f"{lines}\nR9 b 0 1k\n.lib part.lib"
     if told is None:
-        assert "r1 a b 2k" in anew(tmp_path, text)
+        found = anew(tmp_path, text)
+        assert "r1 a b 2k" in found
+        assert found.count(".ends") == sum(each.startswith(".subckt") for each in found) == 2
         return
     with pytest.raises(BadInput, match=f"^{told}"):
         anew(tmp_path, text)

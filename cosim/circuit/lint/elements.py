@@ -193,6 +193,9 @@ class _Parser:
 
     def _take(self, line: Line) -> None:
         found = words(line.text)
+        stray = self.flat and found[0] == ".ends" and self.scope is self.top
+        if stray and line.file != self.top.line.file:
+            return
         handlers: dict[str, Callable[[Line, list[str]], None]] = {
             ".subckt": self._subckt,
             ".ends": self._ends,
@@ -227,8 +230,6 @@ class _Parser:
 
     def _ends(self, line: Line, found: list[str]) -> None:
         if self.scope.parent is None:
-            if self.flat and line.file != self.top.line.file:
-                return
             raise _Unnested(f"{line.place}: .ends has no .subckt.")
         if len(self.ifs) != self.outer_ifs.pop():
             refuse(line, ".if and .endif must stand in the same subcircuit")
