@@ -305,7 +305,8 @@ def own_parameters(top: Scope, name: str, given: Mapping[str, float]) -> dict[st
     known = [key for text in lines for (key, formal), _ in definitions(text) if formal is None]
     for key in given:
         if key.lower() not in known:
-            hint = suggestion(key.lower(), known) or f" (it has {', '.join(known) or 'none'})"
+            able = [each for each in known if not each.startswith("cosim_")]
+            hint = suggestion(key.lower(), able) or f" (it has {', '.join(able) or 'none'})"
             raise BadInput(ended(f"{name}: circuit.param.{key} must be one of its .param{hint}"))
     return {key.lower(): value for key, value in given.items()}
 

@@ -61,7 +61,7 @@ def refuse_unknown(scene: Scene, names: Iterable[str]) -> None:
     from cosim.circuit.lint.deck import read
     from cosim.circuit.lint.elements import parse
     from cosim.circuit.netlist import path_of
-    from cosim.simulation.elsewhere import bounds, refuse_missing
+    from cosim.simulation.elsewhere import bounds, refuse_missing, told
     from cosim.toolchain.processes import isolated
 
     refuse_missing(scene)
@@ -71,13 +71,14 @@ def refuse_unknown(scene: Scene, names: Iterable[str]) -> None:
             f'--over {own[0]}: moves nothing with circuit.model = "{scene.circuit.model}", whose '
             "circuit ngspice does not solve."
         )
-    if scene.circuit.param:
-        path = path_of(scene)
-        own_parameters(parse(read(path)[0]), plain(path), scene.circuit.param)
     files = {fmu.name: fmu.file for fmu in scene.fmu}
     asked = [(files[name.split(".")[1]], name) for name in own if name.startswith("fmu.")]
-    if asked:
-        isolated(_known, asked, lambda _: None, bounds(scene))
+    with told(scene):
+        if scene.circuit.param:
+            path = path_of(scene)
+            own_parameters(parse(read(path)[0]), plain(path), scene.circuit.param)
+        if asked:
+            isolated(_known, asked, lambda _: None, bounds(scene))
 
 
 def _known(asked: Sequence[tuple[str, str]], progress: Any) -> None:

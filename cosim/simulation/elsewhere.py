@@ -30,11 +30,11 @@ def one_run(scene: Scene, progress: Progress, alone: bool = False) -> Result:
     if in_a_worker() or not scene.rung.ngspice:
         from cosim.simulation.here import simulate_here
 
-        with _told(scene):
+        with told(scene):
             return simulate_here(scene, progress, alone)
     ends: list[str] = []
     try:
-        with _told(scene):
+        with told(scene):
             ran = isolated(_worked, (scene, alone), progress, bounds(scene), ends.append)
     except ProcessLost as lost:
         if not scene.fmu:
@@ -61,7 +61,7 @@ def refuse_missing(scene: Scene) -> None:
 
 
 @contextmanager
-def _told(scene: Scene) -> Iterator[None]:
+def told(scene: Scene) -> Iterator[None]:
     """Within this context a BadInput names the scene, too, unless it names a netlist's line: ports,
     ``circuit.save`` and parameters are checked where netlist and FMUs are read."""
     try:

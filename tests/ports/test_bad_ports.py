@@ -163,6 +163,24 @@ def test_a_sweep_over_a_parameter_tells_a_missing_file_as_a_run_does(
         assert re.match(rf'cosim: {scene}: \S+ = "\S+{missing}": there is no such file\.$', told)
 
 
+@pytest.mark.parametrize(
+    ("key", "said"),
+    [
+        ("circuit.param.R9", r"R9 must be one of its \.param \(it has vdd\)"),
+        ("fmu.rotor.K", r"--over fmu\.rotor\.K must be one of its parameters"),
+    ],
+)
+def test_a_sweep_over_what_is_not_there_names_the_scene_and_what_its_user_knows(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], key: str, said: str
+) -> None:
+    """The reader has parameters of its own for a filter in s."""
+    scene, netlist = motor(tmp_path), tmp_path / "bridge.cir"
+    own = "E9 q 0 LAPLACE {V(gp)} {1/(1+1m*s)}\nR9 q 0 1k\n.end"
+    netlist.write_text(netlist.read_text().replace(".end", own))
+    assert main(["sweep", str(scene), "--over", f"{key}=1,2", "--out", str(tmp_path / "o")]) == 2
+    assert re.match(rf"cosim: {scene}: .*{said}", capsys.readouterr().err)
+
+
 KIND = (
     '<TypeDefinitions><SimpleType name="Kind"><Enumeration><Item name="a" value="1"/>'
     '<Item name="b" value="4"/></Enumeration></SimpleType></TypeDefinitions><ModelVariables>'
