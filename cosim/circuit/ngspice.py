@@ -189,10 +189,13 @@ class Engine(Shared.NgSpiceShared):
             self._library.ngSpice_Command(f"unlet {device}".encode())
         return values
 
-    def said(self) -> str:
-        """ngspice's messages of trouble in the last run, as the end of a sentence."""
+    def said(self, begun: bool = False) -> str:
+        """ngspice's messages of trouble in the last run, as the end of a sentence. In a run that
+        had ``begun`` all nodes were determined at the operating point."""
         words = [" ".join(word.split()) for word in (*self._stderr, *self._stdout)]
         if match := next(filter(None, map(_SINGULAR.search, words)), None):
+            if begun:
+                return f"at {match[1]} its matrix became singular, as where a step is too long"
             return (
                 f"nothing determines the voltage at {match[1]} (its matrix is singular); "
                 "look for a missing connection, or give it a resistor to ground, 1e9 ohm say"

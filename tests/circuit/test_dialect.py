@@ -703,6 +703,9 @@ def test_what_ngspice_says_of_a_failure_is_told() -> None:
 
     words: Any = SimpleNamespace(_stdout=["Note"], _stderr=["singular matrix"])
     assert Engine.said(words) == "singular matrix"
+    words._stderr = ["Warning: singular matrix:  check node x"]
+    assert "look for a missing connection" in Engine.said(words)
+    assert Engine.said(words, begun=True).startswith("at node x its matrix became singular")
 
 
 POWERS = {

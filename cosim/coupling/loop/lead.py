@@ -179,7 +179,8 @@ def finished(state: Any, reached: float, duration: float) -> None:
         name = state.source.decode().lower()
         raise SimulationFailed(f"The netlist has an external source {name} that nothing feeds.")
     if reached < duration - max(1e-9 * duration, ROUNDING):
-        told = f"ngspice stopped at t = {reached:.6g} s of {duration:g} s: {engine().said()}."
+        why = engine().said(begun=reached > 0.0)
+        told = f"ngspice stopped at t = {reached:.6g} s of {duration:g} s: {why}."
         kind = StepTooSmall if engine().too_small else SimulationFailed
         if reached > 0.0:  # else it has not read the netlist, or found no operating point
             told += (
