@@ -217,6 +217,14 @@ TOLD = {
 }
 
 
+def test_the_waveform_of_a_source_that_a_port_feeds_is_not_looked_at(tmp_path: Path) -> None:
+    """LTspice's number of periods, say: the port's values stand in its place."""
+    path = tmp_path / "own.cir"
+    path.write_text("t\nV1 in 0 SINE(0 1 20 0 0 0 5)\nR1 in 0 1k\n.end\n")
+    made = deck(path, ["V1"], [], {}, 1e-3, 1e-5, 1e-6, False, {})
+    assert "v1 in 0 external" in made.text.split("\n")
+
+
 @pytest.mark.parametrize("line", TOLD)
 def test_what_would_mean_something_else_is_told(line: str, tmp_path: Path) -> None:
     path = tmp_path / "own.cir"

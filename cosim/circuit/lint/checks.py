@@ -47,11 +47,14 @@ def check(lines: Sequence[Line], required: Sequence[Sequence[str]] = REQUIRED) -
     """
     top = parse(lines)
     names = Names(top)
+    present = {element.name for element in top.elements}
+    replaced = next((each for each in required if present.issuperset(each)), ())
     for scope in top.in_use():
         _check_duplicates(scope)
         check_names(scope, names)
         for element in scope.elements:
-            _check_element(element, scope, names)
+            if scope is not top or element.name not in replaced:
+                _check_element(element, scope, names)
     check_circles(top, names)
     _check_required(top, required)
     check_topology(top)
