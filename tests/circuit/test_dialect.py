@@ -639,9 +639,12 @@ def test_on_the_built_in_mechanics_it_is_told_too(tmp_path: Path) -> None:
     assert result.summary["meas.x"] > 0.0
 
 
-def test_a_circuit_that_rings_is_told_with_its_node(tmp_path: Path) -> None:
-    """50 MHz, on steps that ask for microseconds; the quiet node is a thousandth as much."""
-    tank = "Rt in a 50\nLt a n 1u\nCt n 0 10p\nRq n q 1Meg\nCq q 0 1n\n"
+@pytest.mark.parametrize("node", ["n", "7"])
+def test_a_circuit_that_rings_is_told_with_its_node(tmp_path: Path, node: str) -> None:
+    """50 MHz, on steps that ask for microseconds; the quiet node is a thousandth as much. ngspice
+    reads I(Ct) at a node that it calls 7_vmeas_0."""
+    tank = f"Rt in a 50\nLt a {node} 1u\nCt {node} 0 10p\nRq {node} q 1Meg\nCq q 0 1n\n"
+    tank += "Bz in 0 I=I(Ct)\n"
     (tmp_path / "own.cir").write_text(
         "t\nV1 d 0 0\nVe in 0 PULSE(0 1 0 1n 1n 2u 4u)\nRd d 0 1\n" + tank + ".end\n"
     )
@@ -649,7 +652,8 @@ def test_a_circuit_that_rings_is_told_with_its_node(tmp_path: Path) -> None:
                                        .replace("duration = 3e-3", "duration = 2e-4"))  # fmt: skip
     with in_place():
         (note,) = cosim.run(tmp_path / "own.toml").summary["notes"]
-    assert re.match(r"the circuit took \d+ steps, \d+ times as many .* at node n: ", note), note
+    told = rf"the circuit took \d+ steps, \d+ times as many .* at node {node}: "
+    assert re.match(told, note), note
 
 
 def test_a_netlist_on_the_built_in_mechanics_measures_too(tmp_path: Path) -> None:

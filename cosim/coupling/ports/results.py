@@ -186,9 +186,10 @@ def _notes(run: Run, odd: list[str]) -> Iterator[str]:
         }
         # A node that the user has named is clearer than one within a model, if it rings at all.
         node = max(turns, key=lambda n: turns[n] if "." not in n else turns[n] / _WITHIN)
+        called = re.sub(r"^v\(|_vmeas_\d+|\)$", "", node)  # of 7, where I is read
         yield (
             f"the circuit took {run.steps} steps, {often:.0f} times as many as circuit.max_step "
-            f"asks for. It turned most often, {turns[node]} times, at node {node}: if it rings "
+            f"asks for. It turned most often, {turns[node]} times, at node {called}: if it rings "
             "there, damp it, say by a resistor and a capacitor to ground."
         )
     if odd:
