@@ -107,7 +107,7 @@ def _actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
 
 _COMPLETION = Command(
     "completion",
-    "print what a shell completes commands, options, scenes and files by",
+    "print the script by which a shell completes commands, options, scenes and files",
     _completion,
     [Option("shell", "whose start-up file evaluates it", choices=("bash", "zsh"))],
 )
