@@ -510,7 +510,9 @@ INLINE void follow(const Stretch *c, const Parameters all, const Span *span, con
             advance(p[g], before + g, m + g, &each, notes + g, e + g, sum + g);
             pass_corners(c->drives + g * WIDTH, p[g], e[g].drops, m + g);
         }
-        for (; sample < c->samples && c->times[sample] <= edge; sample++) {
+        /* Beyond a jump the next step has the row, but in the last step of a piece. */
+        const double reached = c->rows && k < c->last ? m->t[0] : edge;
+        for (; sample < c->samples && c->times[sample] <= reached; sample++) {
             if (c->rows) {
                 const Wide late = c->times[sample] - m->t;
                 write_row(p[0], before, m, e, late, out + sample * N_COLUMNS);

@@ -138,6 +138,15 @@ def test_waveforms_are_those_of_the_fmu() -> None:
         assert np.quantile(apart, 0.97) <= 0.01 * scale, name
 
 
+def test_rows_beside_a_jump_are_those_of_the_step_that_they_lie_in() -> None:
+    """A step that the jump moves past its edge, or before it: the current stays in its range."""
+    changes = {"run.duration": 0.5, "run.settle": 0.0, "run.output_step": 1e-5}
+    result = cosim.run("paper-limited", changes | FAST)
+    current, told = result.columns["current"], result.summary
+    assert told["current_min"] - 1e-9 <= current.min()
+    assert current.max() <= told["current_max"] + 1e-9
+
+
 def test_lanes_do_not_know_each_other() -> None:
     """A point has the same numbers alone, and among others of other durations."""
     scene = load("paper-limited", {"run.duration": 1.0, "run.settle": 0.1} | FAST)
