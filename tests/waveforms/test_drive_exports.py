@@ -68,6 +68,13 @@ def test_plain_ngspice_plays_the_source(shape: str, tmp_path: Path) -> None:
         assert -float(final) == pytest.approx(-1.2 + 8.0 * SHAPES[shape](phase), abs=2e-3)
 
 
+def test_times_of_the_source_rise_also_where_a_run_ends_in_a_jump(tmp_path: Path) -> None:
+    """Half a nanosecond after it, as 2/f, rounded, may be."""
+    text = exported(tmp_path, "pwl", "falling-sawtooth", "run.duration=0.0400000005")
+    times = [float(time) for time in re.findall(r"^\+ (\S+) \S", text, re.MULTILINE)]
+    assert times == sorted(set(times)) and times[-1] == pytest.approx(0.04, abs=1e-9)
+
+
 def test_a_run_without_a_coil_has_no_command(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
