@@ -137,6 +137,8 @@ LONG = range(10_000_000_000)
         (["coil.count=1,2"], {}, "a sweep needs at least one key and its values, such as --over"),
         ({"coil.count": 2}, {}, '--over: "coil.count" must be a key, 2 its numbers'),
         ({"coil.count": "12"}, {}, '"12" its numbers'),
+        ({"coil.count": np.array(2)}, {}, "2 its numbers"),
+        ({"coil.count": [1, 2]}, {"workers": 2.0}, "--workers 2.0: must be a whole number"),
         ({"coil.count": ["a"]}, {}, '"a" must be a whole number from 1 to 16'),
         ({"coil.count": [[1]]}, {}, "[1] must be a whole number from 1 to 16"),
         ({"coil.count": [ENDLESS]}, {}, "an endless number must be a whole number from 1 to 16"),
@@ -150,7 +152,7 @@ LONG = range(10_000_000_000)
         ({"coil.count": [1, 2]}, {"samples": ENDLESS}, "must be a whole number from 1 to 1000000"),
         ({"coil.count": [1, 2]}, {"samples": 3, "seed": 1.5}, "--seed 1.5: must be a whole"),
     ],
-    ids=range(12),
+    ids=range(14),
 )
 def test_what_no_sweep_goes_over(over: Any, more: dict[str, Any], words: str) -> None:
     """Said before any work is done, or any memory taken."""

@@ -8,6 +8,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from functools import partial
 from itertools import groupby, islice
+from numbers import Integral
 from pathlib import Path
 from typing import Any, Self
 
@@ -170,6 +171,6 @@ def workers_asked(workers: int | None) -> int:
     """The number of workers: those asked for, or one for each processor. Raises BadInput."""
     if workers is None:
         return processors()
-    if workers not in range(1, 1025):
+    if not isinstance(workers, Integral) or workers not in range(1, 1025):
         raise BadInput(f"--workers {workers}: must be a whole number from 1 to 1024.")
     return workers

@@ -114,7 +114,9 @@ def test_bad_input(
     assert words in said and said.count("\n") == 1 and not out.exists()
 
 
-@pytest.mark.parametrize("given", [{"budget": 26.5}, {"budget": "30"}, {"workers": 1.5}])
+@pytest.mark.parametrize(
+    "given", [{"budget": 26.5}, {"budget": 30.0}, {"budget": "30"}, {"workers": 1.5}]
+)
 def test_counts_are_whole(given: dict[str, Any]) -> None:
     with pytest.raises(BadInput, match=rf"--{next(iter(given))} .*: must be a whole number from"):
         tune("held", ["run.duration=0.02"], maximise="v_average", **given)

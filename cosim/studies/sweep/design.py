@@ -80,6 +80,7 @@ def _check_count(over: Mapping[str, Sequence[Number]]) -> None:
     """Refuse too large a grid before its values are looked at."""
     for name, values in over.items():
         listed = hasattr(values, "__len__") and not isinstance(values, str | bytes)
+        listed = listed and getattr(values, "shape", None) != ()  # an array of no dimension
         if not isinstance(name, str) or not listed:
             raise BadInput(f"--over: {shown(name)} must be a key, {shown(values)} its numbers.")
     if (count := prod(map(len, over.values()))) > MOST_POINTS:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, nullcontext, suppress
 from dataclasses import dataclass, replace
 from math import inf, isfinite
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -121,7 +122,7 @@ def tune(
         changes, shape = family(name) if asked else ({}, {})
         families[name] = changed(scene, changes, "--waveform"), {**keys, **both, **shape}
     least = FEWEST_RUNS + 2 * max(len(ranges) for _, ranges in families.values())
-    if budget not in range(least, MOST_RUNS + 1):  # 26.5 is not, either
+    if not isinstance(budget, Integral) or budget not in range(least, MOST_RUNS + 1):
         raise BadInput(
             f"--budget {budget}: must be a whole number from {least}, for these keys, to "
             f"{MOST_RUNS}."
