@@ -321,7 +321,7 @@ LONG_NUMBERS = [
     ["sweep", "held", "--over=friction.mu_s=0.7:0.8:3", f"--samples={DIGITS}"],
     ["sweep", "held", "--over=friction.mu_s=0.7:0.8:3", "--samples=3", f"--seed=-{DIGITS[:4000]}"],
     ["sweep", "held", "--over=friction.mu_s=0.7:0.8:3", f"--workers={DIGITS[:4000]}"],
-    ["tune", "held", "--maximise=v_average", f"--budget={DIGITS[:4000]}"],
+    ["tune", "ideal-current", "--maximise=v_average", f"--budget={DIGITS[:4000]}"],
     ["tune", "held", "--maximise=v_average", f"--over=friction.mu_s={DIGITS}:{DIGITS}"],
     ["tune", "held", "--maximise=v_average", f"--seed=-{DIGITS[:4000]}"],
 ]

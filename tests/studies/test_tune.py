@@ -83,6 +83,7 @@ def test_all_runs_fail() -> None:
         )
 
 
+STILL = ["--set", "circuit.model=none"]
 BAD = [
     (["--maximise", "speed"], "speed is not a number of this scene's summary"),
     (["--maximise", "v_averge"], "v_averge is not a number of this scene's summary; did you mean"),
@@ -96,7 +97,8 @@ BAD = [
     (["--maximise", "v_average", "--over", "drive.offset=0:1e9"], "from -100 to 100 V"),
     (["--maximise", "v_average", "--over", "circuit.model=0:1"], "not a number"),
     (["--maximise", "v_average", "--minimise", "v_average"], "either maximise or minimise"),
-    (["--maximise", "v_average", "--set", "drive.waveform=quaid"], "has no knobs"),
+    (["--maximise", "v_average", *STILL, "--set", "drive.waveform=quaid"], '"quaid" has no knobs'),
+    (["--maximise", "v_average", *STILL], 'circuit.model = "none" has no knobs'),
     ([], "either maximise or minimise"),
     (["--maximise", "v_average", "--workers", "0"], "--workers 0"),
     (["--maximise", "v_average", "--seed", "-1"], "--seed -1"),
@@ -109,7 +111,7 @@ def test_bad_input(
 ) -> None:
     out = tmp_path / "out"
     quick = ["--set", "run.duration=0.02"]
-    assert main(["tune", "held", *quick, *arguments, "--out", str(out)]) == 2
+    assert main(["tune", "ideal-current", *quick, *arguments, "--out", str(out)]) == 2
     said = capsys.readouterr().err
     assert words in said and said.count("\n") == 1 and not out.exists()
 
@@ -119,7 +121,7 @@ def test_bad_input(
 )
 def test_counts_are_whole(given: dict[str, Any]) -> None:
     with pytest.raises(BadInput, match=rf"--{next(iter(given))} .*: must be a whole number from"):
-        tune("held", ["run.duration=0.02"], maximise="v_average", **given)
+        tune("ideal-current", ["run.duration=0.02"], maximise="v_average", **given)
 
 
 def test_keys_twice() -> None:
@@ -338,7 +340,9 @@ def test_waveforms_and_heats_that_are_none(
     words: list[str], why: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    assert main(["tune", "held", "--maximise", "v_average", *words, "--out", str(out)]) == 2
+    assert (
+        main(["tune", "ideal-current", "--maximise", "v_average", *words, "--out", str(out)]) == 2
+    )
     said = capsys.readouterr().err
     assert why in said and said.count("\n") == 1 and not out.exists()
 

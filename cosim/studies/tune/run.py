@@ -107,10 +107,13 @@ def tune(
         raise BadInput(f"tune: either maximise or minimise {words}.")
     scene = load(scene, overrides)
     check_seed(seed)
-    if not over and not waveform and scene.drive.waveform not in COMMANDS:
+    shaped = waveform or scene.drive.waveform in COMMANDS
+    if not over and not (shaped and scene.rung.driven):
+        key = "circuit.model" if shaped else "drive.waveform"
+        still = scene.circuit.model if shaped else scene.drive.waveform
         raise BadInput(
-            f'scene {scene.name}: drive.waveform = "{scene.drive.waveform}" has no knobs; name '
-            "what to tune with --over table.key=low:high."
+            f'scene {scene.name}: {key} = "{still}" has no knobs; name what to tune with '
+            "--over table.key=low:high."
         )
     keys = _checked(over or KNOBS)
     refuse_unknown(scene, keys)
