@@ -151,14 +151,16 @@ def _energies(
 
 
 def _hanging(scene: Scene) -> float:
-    """Energy in the flexures at the start, J: the scale of a balance without a drive."""
+    """Energy in the flexures at the start, by the weight and by a lift, J: the scale of a balance
+    without a drive."""
     if scene.surface_is_given:
         return 0.0
     mechanics = scene.mechanics
     ram = mechanics.ram_mass if mechanics.free_ram else 0.0
     mass = ram + mechanics.surface_mass + mechanics.part_mass / mechanics.n_surfaces
-    force = mass * mechanics.gravity
-    return scene.coil.count * force**2 / (2.0 * mechanics.flexure_stiffness)
+    stiffness, lift = mechanics.flexure_stiffness, mechanics.initial_lift
+    weight = mass * mechanics.gravity
+    return 0.5 * scene.coil.count * (weight**2 / stiffness + stiffness * lift**2)
 
 
 def motion(scene: Scene, recorder: Recorder) -> Motion:

@@ -537,6 +537,14 @@ def test_progress_goes_from_start_to_end() -> None:
         # All hangs so lightly that the bodies move within the solver's tolerances.
         ("held", ("mechanics.gravity=1e-9", "mechanics.suspension_k1=10000")),
         ("ideal-current", ("drive.amplitude=0", "drive.offset=0", "mechanics.gravity=0")),
+        # Let go without weight and damping: the lift's energy goes to and fro.
+        (
+            "held",
+            (
+                *("mechanics.initial_lift=1e-4", "mechanics.gravity=0", "friction.normal_force=0"),
+                *("mechanics.flexure_damping=0", "mechanics.suspension_damping=0"),
+            ),
+        ),
     ],
 )
 def test_no_energy_is_missing_at_rest(name: str, changes: tuple[str, ...]) -> None:
