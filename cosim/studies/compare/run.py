@@ -121,6 +121,7 @@ def compare(
     the currents, voltages, or parts' velocities where no surface was measured. If ``aligned``, it
     is ``run.settle``: the scenes of the trials begin there as the records do.
 
+    ``numbers`` of what comes back are the scores by name, SI but for ``_mm`` and ``_percent``.
     Raises BadInput for files that cannot be read, and for a run that is too short.
     """
     if not isinstance(run, Result | Scene) and Path(run).suffix.lower() == ".csv":

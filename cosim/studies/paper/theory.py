@@ -80,8 +80,8 @@ def theory(
     """The closed forms of vertical vibratory transport (Yako et al., ICRA 2024, corrected).
 
     Coefficients of friction, the surface's largest acceleration in m/s², the normal force over the
-    part's weight, and the period in s; by default those of the paper's figure 3. Raises BadInput
-    where there is no transport upwards.
+    part's weight, and the period in s; by default those of the paper's figure 3. ``numbers`` of
+    what comes back are SI. Raises BadInput where there is no transport upwards.
 
     >>> round(theory(period=0.05).numbers["up"]["v_average"], 4)
     0.1524

@@ -97,7 +97,9 @@ def tune(
     median over all turns of the keys of ``over``, or the worst of them where their signs differ.
     Settings that make more ``heat`` in a coil than :func:`most_heat` gives count as failed.
 
-    In the folder ``out`` it leaves what ``Tuning.save`` writes, and resumes an interrupted search.
+    Of what comes back ``best.value`` is the number and ``best.values`` the keys' values, SI, and
+    ``scene`` is the scene with these. In the folder ``out`` it leaves what ``Tuning.save`` writes,
+    and resumes an interrupted search.
 
     Raises BadInput for bad keys, ranges, quantities; SimulationFailed if all runs failed.
     """
