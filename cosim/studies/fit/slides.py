@@ -45,9 +45,10 @@ class Slide:
 
     ``time`` (since the trial's first frame, s) and ``z`` (m) hold n frames in and next to the
     slide. The other arrays have a row for each of g pairs of instants ``begin`` and ``end`` (s).
-    ``whiten`` (g × n × n) is the inverse Cholesky factor of the covariance of the heights;
-    ``level`` (g × n) is the whitened constant 1, normalised, along which the free initial height
-    moves the residuals; ``fixed`` (g) is the constant of the log-likelihood.
+    ``whiten`` (g × n × n) is the inverse Cholesky factor of the covariance of the heights, with the
+    whitened constant 1 projected out, along which the free initial height moves the residuals;
+    ``weights`` (g × n) are those of the heights in the likeliest initial one; ``fixed`` (g) is the
+    constant of the log-likelihood.
     """
 
     sign: int
@@ -58,95 +59,116 @@ class Slide:
     end: Array
     whiten: Array
     fixed: Array
-    level: Array
+    weights: Array
 
     def log_likelihoods(self, kinetic: Array, plate: Array) -> Array:
         """Log-likelihoods (laws × pairs of instants) of laws (µ_k F_n/m and µ_p F_n/m, m/s²)."""
         chunks = [slice(k, k + CHUNK) for k in range(0, len(kinetic), CHUNK)]
-        return np.concatenate([self._of_few(kinetic[few], plate[few])[0] for few in chunks])
+        whitened = self._whitened()
+        return np.concatenate([self._of_few(*whitened, kinetic[x], plate[x])[0] for x in chunks])
 
-    def _of_few(self, kinetic: Array, plate: Array) -> tuple[Array, Array]:
+    def _whitened(self) -> tuple[Array, Array]:
+        """What the whitened residuals consist of where part and plate do not become equally fast
+        (pairs × 4 × frames): the heights less the plate's way, and what is subtracted for each unit
+        of velocity relative to the plate, acceleration, and velocity after the slide alone; and
+        the inner products of these four."""
+        since, sliding, beyond = self._times(self.time)
+        lasts = (self.end - self.begin)[:, None]
+        uniform = sliding**2 / 2 + lasts * beyond
+        parts = np.stack([self.z - self.v_plate * since, since, uniform, beyond], axis=1)
+        parts = parts @ self.whiten.swapaxes(1, 2)
+        return parts, parts @ parts.swapaxes(1, 2)
+
+    def _of_few(
+        self, parts: Array, products: Array, kinetic: Array, plate: Array
+    ) -> tuple[Array, Array]:
         """Log-likelihoods (laws × pairs) of at most CHUNK laws, and the likeliest velocity of the
-        part relative to the plate at the begin (pairs × laws), m/s.
+        part relative to the plate at the begin (pairs × laws), m/s; ``parts`` and ``products`` are
+        those of ``_whitened``.
 
         The part's initial height and velocity are free. Least squares finds both, the velocity by
         Gauss–Newton, since the plate's friction changes its sign with it. Arrays are pairs × laws,
-        or pairs × laws × frames.
+        or pairs × laws × frames. The residuals and their derivative are never formed, only their
+        inner products: all that differs between laws but by a factor is ``late``, the time since
+        the turn at which part and plate are equally fast, and its square.
         """
         # The first pass leaves the plate's friction out: its sign needs a first velocity.
         friction = 0.0 * plate
         relative = found = np.zeros((len(self.begin), len(kinetic)))
-        level, whiten = self.level[:, None], self.whiten.swapaxes(1, 2)
+        sliding, lasts = self._times(self.time)[1][:, None], (self.end - self.begin)[:, None]
+        whiten, none, one = self.whiten.swapaxes(1, 2), np.zeros_like(found), np.ones_like(found)
+        without = self.sign * kinetic - GRAVITY
         for _ in range(PASSES):
-            path, slope = self._path(self.time, relative, kinetic, friction)
-            error, slope = (self.z - path) @ whiten, slope @ whiten
-            # Projecting ``level`` out of the whitened residuals (error) and of their derivative
-            # (slope) eliminates the height; the velocity is then a scalar least-squares problem.
-            error -= (error * level).sum(axis=-1, keepdims=True) * level
-            slope -= (slope * level).sum(axis=-1, keepdims=True) * level
-            size, descent = (slope**2).sum(axis=-1) + LEAST_SIZE, (slope * error).sum(axis=-1)
-            found = (descent**2 / size - (error**2).sum(axis=-1)) / 2  # of the linearised optimum
+            first, second, turn, share = _accelerations(relative, lasts, without, friction)
+            half = (second - first) / 2
+            error = np.stack([one, -relative, -first, -2 * half * (lasts - turn)], axis=-1)
+            slope = np.stack([none, one, none, share], axis=-1)
+            size, descent = _dot(slope @ products, slope), _dot(slope @ products, error)
+            square = _dot(error @ products, error)
+            if (turn < lasts).any():
+                late = np.maximum(sliding - turn[..., None], 0.0)
+                late, squared = late @ whiten, (late * late) @ whiten
+                of_late, of_squared = (x @ parts.swapaxes(1, 2) for x in (late, squared))
+                size += share * (2 * _dot(of_late, slope) + share * _dot(late, late))
+                descent += share * (_dot(of_late, error) - half * _dot(late, squared))
+                descent -= half * _dot(of_squared, slope)
+                square += half * (half * _dot(squared, squared) - 2 * _dot(of_squared, error))
+            size += LEAST_SIZE
+            found = (descent**2 / size - square) / 2  # of the linearised optimum
             relative, friction = relative + descent / size, plate
         return (self.fixed[:, None] + found).T, relative
 
-    def _path(
-        self, time: Array, relative: Array, kinetic: Array, plate: Array
-    ) -> tuple[Array, Array]:
-        """The part's displacement [m] from the begin until ``time``, and its derivative by the
-        initial velocity ``relative`` to the plate [s]; both pairs × laws × frames. Before the begin
-        and after the end the velocity is constant: the covariance holds how the part accelerates
-        there."""
-        lasts = (self.end - self.begin)[:, None, None]
-        relative, without = relative[..., None], (self.sign * kinetic - GRAVITY)[:, None]
-        first, second, turn = _accelerations(relative, lasts, without, plate[:, None])
-        v_begin = self.v_plate + relative
-        v_turn = v_begin + first * turn
-        v_end = v_turn + second * (lasts - turn)
-        # The time since the begin is split at the slide's begin, turn and end.
-        since = (time - self.begin[:, None])[:, None]
-        early, sliding = np.minimum(since, 0.0), since.clip(0.0, lasts)
-        to_turn, beyond = np.minimum(sliding, turn), (since - lasts).clip(0.0)
-        from_turn = sliding - to_turn
-        path = v_begin * early + (v_begin + first * to_turn / 2) * to_turn
-        path += (v_turn + second * from_turn / 2) * from_turn
-        path += v_end * beyond
-        # The initial velocity moves the turn, too, so velocities after it change by this share.
-        share = np.divide(second, first, out=np.ones_like(first), where=turn < lasts)
-        return path, early + to_turn + share * (from_turn + beyond)
+    def _times(self, time: Array) -> tuple[Array, Array, Array]:
+        """The times since the begin (pairs × frames), s: in all, within the slide, and after it."""
+        since, lasts = time - self.begin[:, None], (self.end - self.begin)[:, None]
+        return since, since.clip(0.0, lasts), (since - lasts).clip(0.0)
 
     def predicted(self, kinetic: float, plate: float, time: Array) -> Array:
         """The part's heights [m] at times ``time`` by a law [m/s²], with the law's likeliest pair
-        of instants; NaN outside the slide. The initial height fits the slide's tracked frames."""
+        of instants; NaN outside the slide. The initial height fits the slide's tracked frames.
+
+        Before the begin and after the end the velocity is constant: the covariance holds how the
+        part accelerates there."""
         law = np.array([kinetic]), np.array([plate])
         likeliest = self.log_likelihoods(*law)[0].argmax()
         best = self.only(np.arange(len(self.begin)) == likeliest)
-        whole = np.concatenate([self.time, time])
-        path = best._path(whole, best._of_few(*law)[1], *law)[0][0, 0]
+        relative, lasts = best._of_few(*best._whitened(), *law)[1], best.end - best.begin
+        without = self.sign * law[0] - GRAVITY
+        first, second, turn, _ = _accelerations(relative, lasts, without, law[1])
+        since, sliding, beyond = best._times(np.concatenate([self.time, time]))
+        late = (sliding - turn).clip(0.0)
+        path = (self.v_plate + relative) * since + first * (sliding**2 / 2 + lasts * beyond)
+        path = (path + (second - first) * (late**2 / 2 + (lasts - turn) * beyond))[0]
         frames = len(self.time)
-        # Generalised least squares of a constant: the weights are proportional to 1ᵀ C⁻¹.
-        weights = best.level[0] @ best.whiten[0]
-        start = weights @ (self.z - path[:frames]) / weights.sum()
+        start = best.weights[0] @ (self.z - path[:frames])
         slides = (time >= best.begin) & (time <= best.end)
         return np.where(slides, start + path[frames:], np.nan)
 
     def only(self, pairs: npt.NDArray[np.bool_]) -> "Slide":
         """This slide restricted to some of its pairs of instants."""
-        names = ("begin", "end", "whiten", "fixed", "level")
+        names = ("begin", "end", "whiten", "fixed", "weights")
         return replace(self, **{name: getattr(self, name)[pairs] for name in names})
+
+
+def _dot(one: Array, other: Array) -> Array:
+    return np.einsum("glk,glk->gl", one, other)
 
 
 def _accelerations(
     relative: Array, lasts: Array, without: Array, plate: Array
-) -> tuple[Array, Array, Array]:
-    """The part's accelerations until it is as fast as the plate, and from then on; and the time of
-    this turn since the begin, at most ``lasts``. ``without`` is the acceleration without the plate,
-    whose friction, ``plate``, opposes the part's velocity ``relative`` to it."""
+) -> tuple[Array, Array, Array, Array]:
+    """The part's accelerations until it is as fast as the plate, and from then on; the time of this
+    turn since the begin, at most ``lasts``; and by how much more than 1 the velocity after it
+    changes with that at the begin, which moves the turn, too. ``without`` is the acceleration
+    without the plate, whose friction, ``plate``, opposes the part's velocity ``relative`` to it."""
     direction = np.where(relative >= 0.0, 1.0, -1.0)
     first, second = without - direction * plate, without + direction * plate
     turn = np.broadcast_to(lasts, relative.shape).copy()
     np.divide(-relative, first, out=turn, where=first * relative < 0.0)
     # The part then reverses over the plate, or sticks to it where the plate's friction can hold it.
-    return first, np.where(second * direction < 0.0, second, 0.0), np.minimum(turn, lasts)
+    second, turn = np.where(second * direction < 0.0, second, 0.0), np.minimum(turn, lasts)
+    share = np.divide(second, first, out=np.ones_like(first), where=turn < lasts) - 1.0
+    return first, second, turn, share
 
 
 @dataclass(frozen=True)
@@ -224,7 +246,11 @@ def slide(trial: Trial, span: Span, noise: float, roughness: float) -> Slide | N
     volume = np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1) + np.log(area)
     fixed = -volume - np.log(len(begin))  # all pairs of instants are equally likely before
     v_plate = float(plate_velocity(trial)[span.inside].mean())
-    return Slide(span.sign, at, z, v_plate, begin, end, whiten, fixed, level)
+    # Generalised least squares of a constant: the weights are proportional to 1ᵀ C⁻¹.
+    weights = (level[:, None] @ whiten)[:, 0]
+    weights = weights / weights.sum(axis=1, keepdims=True)
+    whiten -= level[:, :, None] * (level[:, None] @ whiten)
+    return Slide(span.sign, at, z, v_plate, begin, end, whiten, fixed, weights)
 
 
 def _covariances(at: Array, begin: Array, end: Array, noise: float, roughness: float) -> Array:
