@@ -41,7 +41,13 @@ LOOSER = 1e-6
 """``mechanics.tolerance`` of that run where the scene has no steps of ngspice."""
 
 LEAST_TOLD = 5e-5
-"""Least relative error of v_average with ngspice, as seen: two runs may err alike by chance."""
+"""Least relative error of v_average, or of a port's mean, with ngspice, as seen: two runs may err
+alike by chance."""
+
+HARDLY = 0.7
+"""Share of a run's steps from which on those of its coarser run are hardly fewer: edges of the
+netlist's own sources rule them, and both runs err alike there. It takes a smaller tolerance to show
+this, which then costs few more steps."""
 
 STRICT = 2.4
 """Factor by which steps of the first finer run of a strict check are shorter; squared: second."""
@@ -113,20 +119,30 @@ def checked(scene: Scene, run: Callable[[], Result], strict: bool = False) -> Re
 def checked_ports(scene: Scene, run: Callable[[], Result]) -> Result:
     """The result of ``run``, which runs a scene with ports, with an error ``NAME.mean_error`` of
     each mean: the difference to a run with all steps COARSER times as long, or as short where a
-    scene does not allow such long ones. No error where that run fails. Raises what ``run`` raises.
+    scene does not allow such long ones; the greater one where a sharper run is needed, too. No
+    error where the first one fails. Raises what ``run`` raises.
     """
-    told: dict[str, Any] = {}
     with threads(1) as (pool, going):
-        other = pool.submit(one_run, few_rows(_longer(scene, COARSER)), going, alone=True)
+
+        def numbers(of: Scene) -> dict[str, Any]:
+            with suppress(CosimError):
+                return one_run(few_rows(of), going, alone=True).summary
+            return {}
+
+        other = pool.submit(numbers, _longer(scene, COARSER))
         result = run()
-        with suppress(CosimError):
-            told = other.result().summary
+        own, told = result.summary, [other.result()]
+        if HARDLY < told[0].get("circuit_steps", 0) / max(1, own["circuit_steps"]) < 1.0 / HARDLY:
+            sharper = scene.having(circuit={"reltol": scene.circuit.reltol / COARSER**3})
+            told.append(pool.submit(numbers, sharper).result())
     errors = {
-        f"{name}_error": abs(value - told[name])
-        for name, value in result.summary.items()
-        if name.endswith(".mean") and name in told
+        f"{name}_error": max(
+            LEAST_TOLD * abs(value), *(abs(value - each[name]) for each in told if name in each)
+        )
+        for name, value in own.items()
+        if name.endswith(".mean") and name in told[0]
     }
-    return replace(result, summary=result.summary | errors)
+    return replace(result, summary=own | errors)
 
 
 def motion(scene: Scene, progress: Progress) -> dict[str, Any]:
