@@ -572,9 +572,8 @@ class Run(Table):
     def _check(self) -> None:
         for key in self.model_fields_set & {"settle", "output_step"}:
             if (value := getattr(self, key)) > self.duration - SHORTEST:
-                raise fault(
-                    f"run.{key} = {value:g} s must be below run.duration = {self.duration:g} s"
-                )
+                longest = f"run.duration = {self.duration:.12g} s"
+                raise fault(f"run.{key} = {value:.12g} s must be below {longest}")
         if self.duration / self.output_step > MAX_ROWS:
             raise fault(
                 f"run.output_step = {self.output_step:g} s makes more than {MAX_ROWS} rows in "

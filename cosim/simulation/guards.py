@@ -63,7 +63,7 @@ def _told_of(found: list[float], travel: float) -> Iterator[str]:
         return
     start = min(found, key=abs)
     places = [
-        f"q = {q * 1e3:.3g} mm"
+        f"q = {round(q * 1e3, 9) + 0.0:.3g} mm"  # no rounding where the centre is meant
         + (", at the upper wall" if q >= travel else ", at the lower wall" if q <= -travel else "")
         + (", where the run starts" if q == start else "")
         for q in found

@@ -254,7 +254,7 @@ def _limits(summary: dict[str, Any]) -> str:
     words = f"{', '.join(acted)} of the time" if acted else ""
     if "saturated_fraction" in summary:
         return words or "never"
-    unknown = "not known: the netlist has no node swing"
+    unknown = "not known: the netlist has no node swing that tells it"
     return f"{words}; of the swing {unknown}" if words else unknown
 
 

@@ -608,6 +608,7 @@ def test_nothing_heavy_is_imported() -> None:
         ({"run.average": "slope", "run.settle": 0.1995}, "less than two frames"),
         ({"run.average": "slope", "run.duration": 1e-3}, "run.settle = 0.0005 s leaves less than"),
         ({"run.settle": 0.2 - 1e-12}, "must be below run.duration"),
+        ({"run.settle": 0.2 - 1e-10}, "run.settle = 0.1999999999 s must be below"),
     ],
 )
 def test_averages_need_something_to_average(settings: dict[str, Any], said: str) -> None:

@@ -246,7 +246,7 @@ def test_waveforms_stay_within_the_sweeps_folder(linked: bool, tmp_path: Path) -
         (out / "points").symlink_to(theirs)
     else:
         (out / "points").write_text("theirs")
-    for keep in ([], ["z_part"]):
+    for keep in ([], ["z_part"], "z_part"):
         with in_place(), pytest.raises(BadInput, match="points: this is no directory of the sweep"):
             sweep("held", {"friction.mu_s": [0.7]}, {"run.duration": 0.01}, keep=keep, out=out)
     assert [path.read_text() for path in theirs.iterdir()] == ["theirs"]

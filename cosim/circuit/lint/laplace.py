@@ -44,11 +44,8 @@ def without_laplace(text: str) -> Iterator[str]:
     (num, den), own = ratio, re.sub(r"\W", "_", name.lower())
     most = len(den) - 1
     least = next(power for power, each in enumerate(den) if each != "0")
-    t, unit, x = (
-        f"cosim_{own}_t",
-        f"cosim_{own}_k",
-        [f"{own}_s{power}" for power in range(most + 1)],
-    )
+    t, unit = f"cosim_{own}_t", f"cosim_{own}_k"  # no parameters of the user's
+    x = [f"{own}_s{power}" for power in range(most + 1)]
     alike = f"abs(({den[most]})/({den[least]}))**(1/{max(most - least, 1)})"
     yield f".param {t}={{{alike if most > least else 1}}}"
     shares = [f"({each})*{t}**(-{power})" for power, each in enumerate(num)]

@@ -53,7 +53,7 @@ def sweep(
     samples: int | None = None,
     random: bool = False,
     seed: int = 0,
-    keep: Sequence[str] = (),
+    keep: str | Sequence[str] = (),
     out: str | os.PathLike[str] | None = None,
     workers: int | None = None,
     dask: str | None = None,
@@ -71,7 +71,7 @@ def sweep(
     long as the scene's own.
 
     In the folder ``out`` it leaves ``sweep.nc`` and ``figure.png``, and takes up what an
-    interrupted sweep has left there; with ``keep``, names of waveforms, also those of every point,
+    interrupted sweep has left there; with ``keep``, waveforms' names, also those of every point,
     as ``points/NUMBER.nc``. ``workers`` local processes (default: one for each processor), or the
     Dask cluster at the address ``dask``. ``progress`` is told the points done, failed, and in all.
 
@@ -89,7 +89,8 @@ def sweep(
     if keep and out is None:
         raise BadInput("keep: waveforms are kept in a folder; name one as out.")
     with TemporaryDirectory() if out is None else nullcontext(out) as folder:
-        data = _sweep(scene, design, Path(folder), keep, workers, dask, progress)
+        kept = [keep] if isinstance(keep, str) else keep
+        data = _sweep(scene, design, Path(folder), kept, workers, dask, progress)
         if out is not None:
             from cosim.studies.sweep import figure
 
