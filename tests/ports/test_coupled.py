@@ -33,6 +33,7 @@ from cosim.coupling.ports.run import Run
 from cosim.errors import BadInput, SimulationFailed
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import changed, load, to_toml
+from cosim.simulation.simulate import simulate
 from cosim.toolchain.processes import in_place
 from tests.helpers import spice
 from tests.ports.foreign import build, recompiled, reworded
@@ -281,6 +282,14 @@ def test_a_slope_by_which_nothing_changes_is_refused(tmp_path: Path, wrong: str)
     scene.write_text(text.replace("scale", 'slope = "omega"\nscale', 1))
     with pytest.raises(BadInput, match="does not change by its slope"):
         here(scene, {})
+
+
+def test_the_slope_of_a_ram_that_rings_in_its_wall_is_not_refused() -> None:
+    """In steps longer than the ringing its little changes lie beyond the slopes at both ends."""
+    settings = {"frequency": 12.685, "amplitude": 8.142, "offset": 0.379}
+    given = {f"drive.{key}": value for key, value in settings.items()}
+    given |= {"fmu.rig.normal_force": 0.4539, "run.duration": 0.3}
+    assert simulate(load("closed-grip", given)).summary["rig.v_part.rms"] > 1e-3
 
 
 @pytest.mark.parametrize("tells", ["-9.81", "0.0"])

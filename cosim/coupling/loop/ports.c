@@ -53,9 +53,9 @@ static const double OTHER = 0.1, ROUNDING = 1e-9;
 /* Of a step's change and of the value: by how much an output of the same step is another one. And of
    a step's length: by how much one that ngspice has taken is another than was asked for. */
 
-static const double NOISE = 1e-6, FAR = 0.3;
-/* Of an output's largest value: a change that tells of its slope; of that: how far from it a slope is
-   wrong. */
+static const double NOISE = 1e-3, FAR = 0.3;
+/* Of an output's largest value: a change that tells of its slope, as what rings faster than the steps
+   does not, a ram in its wall, say; of that: how far from it a slope is wrong. */
 
 enum { WRONG = 12, RIGHT = 4 }; /* so many wrong changes tell; so many of them a right one outweighs */
 
