@@ -53,8 +53,9 @@ help:
 run: $(COMPILED)
 	@$(VENV)/bin/cosim run $(SCENE) $(ARGS)
 
+# The tests fill all processors; threads of their linear algebra would wait for each other, spinning.
 test: $(COMPILED) $(VENV)/.locked-test
-	@$(PY) -m pytest -n auto --dist worksteal -m "not slow" $(ARGS)
+	@OPENBLAS_NUM_THREADS=1 $(PY) -m pytest -n auto --dist worksteal -m "not slow" $(ARGS)
 
 test-all: $(COMPILED) $(VENV)/.locked-test
 	@$(PY) -m pytest $(ARGS)
