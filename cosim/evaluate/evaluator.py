@@ -8,11 +8,9 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from functools import partial
 from itertools import groupby, islice
-from numbers import Integral
 from pathlib import Path
 from typing import Any, Self
 
-from cosim.errors import BadInput
 from cosim.evaluate.many import Pool, cluster, each, threads
 from cosim.evaluate.point import (
     Outcome,
@@ -26,6 +24,7 @@ from cosim.evaluate.point import (
 )
 from cosim.evaluate.store import Store, hashed
 from cosim.scene import Scene
+from cosim.scene.messages import check_whole
 from cosim.toolchain.processes import processors
 
 TOGETHER = 64
@@ -171,6 +170,5 @@ def workers_asked(workers: int | None) -> int:
     """The number of workers: those asked for, or one for each processor. Raises BadInput."""
     if workers is None:
         return processors()
-    if not isinstance(workers, Integral) or workers not in range(1, 1025):
-        raise BadInput(f"--workers {workers}: must be a whole number from 1 to 1024.")
+    check_whole("--workers", workers, 1, 1024)
     return workers

@@ -214,9 +214,10 @@ def _read(source: str, origin: str, builtin: list[str]) -> dict[str, Any]:
 
 
 def _check_names(data: dict[str, Any], origin: str) -> None:
-    told = " ".join(map(messages.ended, islice(_unknown(data, origin), messages.MOST_TOLD)))
+    told = [*map(messages.ended, islice(_unknown(data, origin), messages.MOST_TOLD))]
     if told:
-        raise BadInput(f"{origin}: {told.replace(' there is no', ' There is no')}")
+        told[1:] = [sentence[:1].upper() + sentence[1:] for sentence in told[1:]]
+        raise BadInput(f"{origin}: {' '.join(told)}")
 
 
 def _unknown(data: dict[str, Any], origin: str) -> Iterator[str]:

@@ -3,6 +3,8 @@
 import difflib
 from collections.abc import Iterable, Mapping
 from itertools import islice
+from math import inf
+from numbers import Integral
 from typing import Any
 
 from pydantic import ValidationError
@@ -105,6 +107,14 @@ def idle(key: Key, rung: Rung, waveform: str, method: CouplingMethod) -> str:
         return f"{lead} {at}; it acts in {listed(able)}"
     waveforms = [name for name, known in GIVEN_SURFACES.items() if key.name in known]
     return f'{lead} {at}; it acts in "none" with drive.waveform = {listed(waveforms)}'
+
+
+def check_whole(option: str, value: Any, least: int, most: float = inf, why: str = "") -> None:
+    """Raise BadInput for an option's value that is no whole number from ``least``, of which
+    ``why`` tells more, to ``most``."""
+    if not (isinstance(value, Integral) and least <= int(value) <= most):
+        end = f" to {most}" if most < inf else ""
+        raise BadInput(f"{option} {shown(value)}: must be a whole number from {least}{why}{end}.")
 
 
 def explain(error: ValidationError, origins: Mapping[str, tuple[int, str]], default: str) -> str:

@@ -90,10 +90,7 @@ def checked(scene: Scene, run: Callable[[], Result], strict: bool = False) -> Re
     with threads(2) as (pool, going):
 
         def mean(of: Scene | None) -> float | None:
-            with suppress(CosimError):
-                if of is not None:
-                    return one_run(few_rows(of), going, alone=True).summary["v_average"]
-            return None
+            return None if of is None else _numbers(of, going).get("v_average")
 
         asked = [_steps(scene, COARSER)]
         if strict:
@@ -123,18 +120,12 @@ def checked_ports(scene: Scene, run: Callable[[], Result]) -> Result:
     error where the first one fails. Raises what ``run`` raises.
     """
     with threads(1) as (pool, going):
-
-        def numbers(of: Scene) -> dict[str, Any]:
-            with suppress(CosimError):
-                return one_run(few_rows(of), going, alone=True).summary
-            return {}
-
-        other = pool.submit(numbers, _longer(scene, COARSER))
+        other = pool.submit(_numbers, _longer(scene, COARSER), going)
         result = run()
         own, told = result.summary, [other.result()]
         if HARDLY < told[0].get("circuit_steps", 0) / max(1, own["circuit_steps"]) < 1.0 / HARDLY:
             sharper = scene.having(circuit={"reltol": scene.circuit.reltol / COARSER**3})
-            told.append(pool.submit(numbers, sharper).result())
+            told.append(pool.submit(_numbers, sharper, going).result())
     errors = {
         f"{name}_error": max(
             LEAST_TOLD * abs(value), *(abs(value - each[name]) for each in told if name in each)
@@ -143,6 +134,13 @@ def checked_ports(scene: Scene, run: Callable[[], Result]) -> Result:
         if name.endswith(".mean") and name in told[0]
     }
     return replace(result, summary=own | errors)
+
+
+def _numbers(scene: Scene, going: Progress) -> dict[str, Any]:
+    """The summary of a run of ``scene`` by itself; empty where it fails."""
+    with suppress(CosimError):
+        return one_run(few_rows(scene), going, alone=True).summary
+    return {}
 
 
 def motion(scene: Scene, progress: Progress) -> dict[str, Any]:

@@ -9,12 +9,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
-from numbers import Integral
 from pathlib import Path
 from pkgutil import iter_modules
 from typing import Any, Literal
-
-from cosim.errors import BadInput, plain
 
 _PACKAGE = __name__.rpartition(".")[0]
 
@@ -67,8 +64,9 @@ SEED = Option("--seed", "of the search", "N", int, 0)
 
 def check_seed(seed: int) -> None:
     """Raise BadInput for a seed of which NumPy makes no generator."""
-    if not (isinstance(seed, Integral) and seed >= 0):
-        raise BadInput(f"--seed {plain(seed)}: must be a whole number from 0.")
+    from cosim.scene.messages import check_whole  # not at start-up
+
+    check_whole("--seed", seed, 0)
 
 
 WORKERS = Option("--workers", "runs at once (default: one for each processor)", "N", int)

@@ -53,6 +53,8 @@ def drawn() -> Iterator[tuple[dict[str, str], Scene]]:
 def test_rows_drawn_blind_are_what_another_solver_finds() -> None:
     """The camera's reading, too: parabolas through five frames. With ngspice the mean velocity is
     as near as the run itself tells."""
+    from scipy.signal import savgol_filter  # takes a second, and only this test needs it
+
     rows = drawn()
     for _ in range(ROWS):
         row, scene = next(rows)
@@ -65,8 +67,6 @@ def test_rows_drawn_blind_are_what_another_solver_finds() -> None:
             tol=1e-8,
             times=exposures(run.duration, run.settle, run.shutter).tolist(),
         )
-        from scipy.signal import savgol_filter  # takes a second, and only this test needs it
-
         heights = found.samples["z_surface"]
         seen = np.array(savgol_filter(heights, 5, 2, deriv=2, delta=1.0 / FRAME_RATE))
         told = cosim.run(scene).summary["v_average_error"] if scene.rung.ngspice else 0.0

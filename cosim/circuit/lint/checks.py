@@ -48,23 +48,22 @@ def check(lines: Sequence[Line], required: Sequence[Sequence[str]] = REQUIRED) -
     top = parse(lines)
     names = Names(top)
     present = {element.name for element in top.elements}
-    replaced = next((each for each in required if present.issuperset(each)), ())
+    replaced = next((each for each in required if present.issuperset(each)), None)
     for scope in top.in_use():
         _check_duplicates(scope)
         check_names(scope, names)
         for element in scope.elements:
-            if scope is not top or element.name not in replaced:
+            if scope is not top or element.name not in (replaced or ()):
                 _check_element(element, scope, names)
     check_circles(top, names)
-    _check_required(top, required)
+    _check_required(top, required, missing=replaced is None)
     check_topology(top)
     return top
 
 
-def _check_required(top: Scope, required: Sequence[Sequence[str]]) -> None:
-    present = {element.name for element in top.elements}
+def _check_required(top: Scope, required: Sequence[Sequence[str]], missing: bool) -> None:
     agreed = {name for alternative in required for name in alternative}
-    if required and not any(present.issuperset(alternative) for alternative in required):
+    if required and missing:
         ways = " or ".join(
             " and ".join(name.capitalize() for name in alternative) for alternative in required
         )

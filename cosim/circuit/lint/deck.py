@@ -80,8 +80,9 @@ _FILE_WORD = re.compile(r"\b(?:\w*_)?(?:file|filename|wavefile)\b", re.IGNORECAS
 _COMMAND_COMMENT = re.compile(r"\*\s*(?:#\s*[\w!/.]|ng_script)", re.IGNORECASE)
 _TRAILING = re.compile(r";|//|(?:^|(?<=[\s,]))\$")  # begins a comment; "$" only between words
 _NUMBERED = re.compile(r"(?<![\w.])\$(?=n_\d)", re.IGNORECASE)  # begins PSpice's own nodes
-# A name, perhaps with "=" and a value in braces, quotes or bare, or with a number.
+# A value in braces or quotes, or a number.
 _VALUE = re.compile(r"\{[^{}]*\}|'[^']*'|[+-]?[\d.][\w.+-]*")
+# A name, perhaps with "=" and a value in braces, quotes or bare, or with a number.
 _OPTION = re.compile(
     r"([a-z_]\w*)(?:\s*=\s*(\{[^{}]*\}|'[^']*'|[\w.+-]+)|\s+([\d.][\w.+-]*))?[\s,]*", re.IGNORECASE
 )

@@ -193,9 +193,9 @@ class _Parser:
 
     def _take(self, line: Line) -> None:
         found = words(line.text)
-        stray = self.flat and found[0] == ".ends" and self.scope is self.top
-        if stray and line.file != self.top.line.file:
-            return
+        of_library = self.flat and line.file != self.top.line.file
+        if of_library and found[0] == ".ends" and self.scope is self.top:
+            return  # ngspice would end the run at it
         handlers: dict[str, Callable[[Line, list[str]], None]] = {
             ".subckt": self._subckt,
             ".ends": self._ends,

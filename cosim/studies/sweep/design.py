@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, prod
-from numbers import Integral
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from cosim.errors import BadInput, plain
 from cosim.evaluate.keys import FREQUENCIES, numeric_key, split
 from cosim.evaluate.point import Number
 from cosim.scene import Key
-from cosim.scene.messages import shown
+from cosim.scene.messages import check_whole, shown
 from cosim.studies.study import check_seed
 
 MOST_POINTS = 1_000_000
@@ -96,8 +95,7 @@ def sample(over: Mapping[str, Sequence[Number]], count: int, seed: int, random: 
     from scipy.stats import qmc
 
     axes = grid(over).axes
-    if not (isinstance(count, Integral) and 1 <= count <= MOST_POINTS):
-        raise BadInput(f"--samples {shown(count)}: must be a whole number from 1 to {MOST_POINTS}.")
+    check_whole("--samples", count, 1, MOST_POINTS)
     check_seed(seed)
     for axis in axes:
         if len(set(axis.values)) < 2:

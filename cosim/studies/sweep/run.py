@@ -71,7 +71,7 @@ def sweep(
     long as the scene's own.
 
     In the folder ``out`` it leaves ``sweep.nc`` and ``figure.png``, and takes up what an
-    interrupted sweep has left there; with ``keep``, waveforms' names, also those of every point,
+    interrupted sweep has left there; with ``keep``, names of waveforms, also those of every point,
     as ``points/NUMBER.nc``. ``workers`` local processes (default: one for each processor), or the
     Dask cluster at the address ``dask``. ``progress`` is told the points done, failed, and in all.
 

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, nullcontext, suppress
 from dataclasses import dataclass, replace
 from math import inf, isfinite
-from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.keys import FREQUENCIES, numeric_key, refuse_unknown
 from cosim.evaluate.point import Number, Outcome, Settings, in_whole_periods
 from cosim.scene import Overrides, Scene, changed, firmware, load
-from cosim.scene.messages import bad, shown, suggestion
+from cosim.scene.messages import bad, check_whole, shown, suggestion
 from cosim.scene.tables import COMMANDS, MOST_CORNERS
 from cosim.search.known import Feasible, Known
 from cosim.search.searches import POPULATION, Climb, Design
@@ -127,11 +126,7 @@ def tune(
         changes, shape = family(name) if asked else ({}, {})
         families[name] = changed(scene, changes, "--waveform"), {**keys, **both, **shape}
     least = FEWEST_RUNS + 2 * max(len(ranges) for _, ranges in families.values())
-    if not isinstance(budget, Integral) or budget not in range(least, MOST_RUNS + 1):
-        raise BadInput(
-            f"--budget {budget}: must be a whole number from {least}, for these keys, to "
-            f"{MOST_RUNS}."
-        )
+    check_whole("--budget", budget, least, MOST_RUNS, ", for these keys,")
     tunings, benches, made = [], [], list[Run]()
 
     def report(run: Run, best: Run | None) -> None:
@@ -226,7 +221,6 @@ def most_heat(scene: Scene, limit: float | str | None) -> float:
 def _checked(over: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
     if not isinstance(over, Mapping):
         raise BadInput(f"--over {shown(over)}: must give each key its range.")
-    found = dict[str, tuple[float, float]]()
     for name, ends in over.items():
         key = numeric_key(str(name))
         try:
@@ -237,8 +231,7 @@ def _checked(over: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, 
         if not sound:
             words = f"must be LOW and HIGH, LOW below HIGH, each {key.allowed}"
             raise BadInput(f"--over {name}: {shown(ends)} {words}.")
-        found[name] = ends
-    return found
+    return dict(over)
 
 
 Progress = Callable[[Run, Run | None], None]
