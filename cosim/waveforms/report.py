@@ -28,7 +28,7 @@ def table(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> st
         ("surface velocity", _range(summary, "v_surface", 1e3, "mm/s", "+.0f")),
         ("surface acceleration", _acceleration(scene, summary)),
         ("  as a camera reads it", _range(summary, "a_camera", 1, "m/s²", "+.0f")),
-        *(("slip, part going " + way, _slip(summary, way)) for way in ("up", "down")),
+        *_slips(summary),
     ]
     if "current_max" in summary:
         rows += [
@@ -124,6 +124,14 @@ def _measured(scene: Scene) -> dict[str, str]:
         "as a camera reads it": _range(numbers, "a_camera", 1, "m/s²", "+.0f"),
     }
     return {name: f"   (measured: {words})" for name, words in values.items() if words}
+
+
+def _slips(summary: dict[str, Any]) -> Sequence[tuple[str, str]]:
+    """A row for each direction of the part, or one for both where only a plate would differ."""
+    up, down = (_slip(summary, way) for way in ("up", "down"))
+    if up == down:
+        return [("slip", up)]
+    return [("slip, part going up", up), ("slip, part going down", down)]
 
 
 def _slip(summary: dict[str, Any], way: str) -> str:

@@ -85,6 +85,18 @@ def test_a_cycle_is_one_of_the_real_command(more: list[str]) -> None:
     assert any("sawtooth 15.15 Hz (20 Hz commanded)" in text for text in words)
 
 
+@pytest.mark.parametrize(("mu", "rows"), [(0.0, ["slip"]), (0.1, ["up", "down"])])
+def test_both_ways_share_a_row_where_no_plate_parts_them(mu: float, rows: list[str]) -> None:
+    """A row of the budget more only where it says more: from the plate's friction."""
+    scene = load("held", {"friction.mu_plate": mu, "run.duration": 0.1})
+    said = [
+        line.split("beyond")[0].split()
+        for line in table(scene, simulate(scene).summary, {}).splitlines()
+        if "beyond" in line
+    ]
+    assert [words[-1] for words in said] == rows
+
+
 def test_a_large_energy_residual_is_told() -> None:
     scene = load("reference", ["circuit.model=ideal", *SHORT])
     summary = dict(simulate(scene).summary)
