@@ -33,6 +33,7 @@ from cosim.coupling.ports.run import Run
 from cosim.errors import BadInput, SimulationFailed
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import changed, load, to_toml
+from cosim.simulation.here import simulate_here
 from cosim.simulation.simulate import simulate
 from cosim.toolchain.processes import in_place
 from tests.helpers import spice
@@ -227,6 +228,16 @@ def test_a_circle_without_a_solution_fails(tmp_path: Path, source: str, said: st
     (tmp_path / "circle.toml").write_text(CIRCLE)
     with pytest.raises(SimulationFailed, match=said):
         here(tmp_path / "circle.toml", {"fmu.b.D": 1.0})
+
+
+@pytest.mark.parametrize("offset", [-1.9, -1.0, 0.0])
+def test_a_motor_at_rest_agrees_when_its_controller_answers(offset: float) -> None:
+    """Its back-EMF of 1e-17 V, right but for rounding, must not learn from the controller's jump
+    how it responds."""
+    control = {"fmu.control.period": 1e-2, "fmu.control.delay": 2e-3, "run.duration": 0.013}
+    given = {"coupling.method": "redo", "drive.offset": offset, "run.output_step": 1e-4}
+    columns = simulate_here(load("closed-grip", given | control), lambda _: None).columns
+    assert columns["control.out"][-1] == 0.5 and columns["jaw.back_emf"][-1] > 1e-3
 
 
 def test_a_run_without_end_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -195,6 +195,44 @@ def test_what_it_feeds_through_is_said(tmp_path: Path, library: Path) -> None:
     assert result.summary["i(Vx).mean"] == pytest.approx(1.0 / 3e3, rel=1e-4)
 
 
+CIRCLE = """
+[[fmu]]
+name = "b"
+file = "sum.fmu"
+[[fmu]]
+name = "c"
+file = "sum.fmu"
+parameters = { every = 1e-3 }
+[[port]]
+from = "b.y"
+to = "g.u"
+scale = -0.4
+[[port]]
+from = "g.y"
+to = "b.u"
+[[port]]
+from = "drive"
+to = "b.w"
+scale = 1e-15
+[[port]]
+from = "b.y"
+to = "c.w"
+[[port]]
+from = "c.s"
+to = "g.w"
+slope = "held"
+"""
+
+
+def test_a_jump_tells_nothing_of_what_agrees_already(tmp_path: Path, library: Path) -> None:
+    """y = s - 0.4 (y + 1e-15 drive) in a circle, of which s jumps by 1 every ms. What agreed before
+    s was right has hardly moved, so it must not learn from s how it responds."""
+    given = {"coupling.method": "redo", "run.duration": 2.5e-3, "run.settle": 0.0}
+    columns = run(tmp_path, library, CIRCLE, given).columns
+    assert columns["c.s"][-1] == 2.0
+    assert columns["g.y"][1:] == pytest.approx(columns["c.s"][1:] / 1.4, rel=1e-4, abs=1e-9)
+
+
 @pytest.mark.parametrize("h", [100.0, 1e7])
 def test_a_step_of_any_length_ends_where_the_jaw_rests(h: float) -> None:
     """2 N/A press the spring. More of its own steps than an int holds lead through 1e7 s."""

@@ -287,6 +287,16 @@ static int step_once(Ports *c, double time)
     return 1;
 }
 
+/* By the secant: what a value that was changed by `more` is `off` now, and was `before`. What follows
+   a change within the tolerance, or as small beside it, is another value's doing. */
+static double response(double known, double more, double off, double before, double within,
+                       double tolerance)
+{
+    if (fabs(more) > fmax(within, tolerance * fabs(off)))
+        return (off - before) / more;
+    return fabs(off) > within ? -1.0 : known;
+}
+
 /* Whether what has come back is what was taken for it; else what to take next, by the secant. */
 static int comes_back(Ports *c, int tries)
 {
@@ -296,16 +306,17 @@ static int comes_back(Ports *c, int tries)
         if (!b->is_one)
             continue;
         const double off = c->outputs[k] - b->guess, more = b->guess - b->last_guess;
-        const double response = (off - b->off) / more;
+        const double within = c->tolerance * fmax(b->largest, fabs(b->guess));
+        const double told = response(b->response, more, off, b->off, within, c->tolerance);
         if (!isfinite(off)) /* which ends the run */
             return 1;
         if (tries == 0)
             b->response = -1.0;
-        else if (isfinite(response) && fabs(response) > 1e-3)
-            b->response = response;
+        else if (isfinite(told) && fabs(told) > 1e-3)
+            b->response = told;
         b->off = off;
         b->last_guess = b->guess;
-        agree &= fabs(off) <= c->tolerance * fmax(b->largest, fabs(b->guess));
+        agree &= fabs(off) <= within;
     }
     for (Back *b = c->backs; b < c->backs + c->n_outputs; b++) {
         if (b->is_one && agree)
@@ -635,12 +646,14 @@ static int to_repeat(Ports *c, double time, double *delta, double old_delta)
         const double off = s->origin.scale * c->outputs[s->origin.place] + s->origin.offset +
                            s->correction - used;
         s->largest = fmax(s->largest, fabs(used));
-        if (fabs(off) > c->tolerance * s->largest)
+        const double within = c->tolerance * s->largest;
+        if (fabs(off) > within)
             agree = 0;
-        if (c->tries > 0 && line != s->guess) {
-            const double response = (off - s->off) / (line - s->guess);
-            if (isfinite(response) && response < -1e-3)
-                s->response = response;
+        if (c->tries > 0) {
+            const double told =
+                response(s->response, line - s->guess, off, s->off, within, c->tolerance);
+            if (isfinite(told) && told < -1e-3)
+                s->response = told;
         }
         s->guess = line;
         s->off = off;
