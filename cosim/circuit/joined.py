@@ -5,7 +5,7 @@ expression, which an added B source computes as its voltage.
 """
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -31,6 +31,16 @@ _NODE = "cosim_read"
 
 
 @dataclass(frozen=True)
+class Edges:
+    """What a netlist's own sources have of edges."""
+
+    pulses: tuple[str, ...]
+    """ngspice's names of the sources with PULSE."""
+    length: float
+    """s, of edges of PULSE that have none."""
+
+
+@dataclass(frozen=True)
 class Deck:
     """The deck for ngspice, and the names of the vectors that it sends."""
 
@@ -47,10 +57,7 @@ class Deck:
     """Sentences on lines of the netlist that have no effect."""
     devices: tuple[str, ...]
     """For each word the device parameter that has its value within a step; "" without one."""
-    pulses: tuple[str, ...]
-    """ngspice's names of the sources with PULSE."""
-    edge: float | None
-    """Length, s, of edges of PULSE that have none."""
+    edges: Edges
 
 
 def unit(words: str) -> str:
@@ -102,8 +109,7 @@ def deck(
         tuple(netlist.measures),
         tuple(without_effect(netlist.dropped)),
         tuple(device if k < len(words) else "" for k, (_, device) in enumerate(read_as)),
-        tuple(_pulses(top, fed)),
-        netlist.edge(max_step, duration),
+        netlist.edges(fed, max_step, duration),
     )
 
 
@@ -163,6 +169,11 @@ class Checked:
                 lengths += [0.01 * value for value in values[5:7] if value]  # on-time and period
                 lengths += [0.01 * max_step] * (None in values[5:7] and own is None)
         return min(lengths)
+
+    def edges(self, fed: Set[str], max_step: float, duration: float) -> Edges:
+        """Those of all sources but the ``fed`` ones."""
+        length = self.edge(max_step, duration)
+        return Edges((), 0.0) if length is None else Edges((*_pulses(self.top, fed),), length)
 
     def text(
         self,
@@ -311,7 +322,7 @@ def own_parameters(top: Scope, name: str, given: Mapping[str, float]) -> dict[st
     return {key.lower(): value for key, value in given.items()}
 
 
-def _pulses(top: Scope, fed: set[str]) -> Iterator[str]:
+def _pulses(top: Scope, fed: Set[str]) -> Iterator[str]:
     """ngspice's names of the sources with PULSE, such as ``v.x1.x2.v3``, but for those fed."""
     for part in Expansion(top).parts(top, {}):
         path, element = part.path, part.element

@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
-from cosim.circuit.joined import Checked, checked, own_parameters, reading
+from cosim.circuit.joined import Checked, Edges, checked, own_parameters, reading
 from cosim.circuit.lint.checks import REQUIRED as AGREED
 from cosim.circuit.lint.deck import Line, read, refuse
 from cosim.circuit.lint.elements import Element
@@ -64,8 +64,9 @@ def path_of(scene: Scene) -> Path:
     return circuits() / f"{circuit.model}.cir"
 
 
-def prepare(scene: Scene) -> tuple[str, dict[str, str]]:
-    """The deck of the scene's circuit, and ngspice's names of the vectors to log, by the log's.
+def prepare(scene: Scene) -> tuple[str, dict[str, str], Edges]:
+    """The deck of the scene's circuit, ngspice's names of the vectors to log, by the log's, and the
+    edges of its sources.
 
     The run goes to ``run.duration`` with steps of at most ``circuit.max_step``. Raises BadInput,
     beginning with the netlist's file and line, for what is wrong with it or might do harm.
@@ -99,7 +100,8 @@ def prepare(scene: Scene) -> tuple[str, dict[str, str]]:
         saved[MOTIONAL] = MOTIONAL
     vectors = dict(zip(netlist.words, reading(netlist.words), strict=True))
     saved |= {name: vectors[word][0] for name, word in words.items()}
-    return text, saved
+    fed = {element.name for element in elements if element.line in external}
+    return text, saved, netlist.edges(fed, circuit.max_step, duration)
 
 
 def _words(scene: Scene) -> dict[str, str]:

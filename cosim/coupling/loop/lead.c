@@ -47,6 +47,10 @@ static const double SETTLED_SHARE = 0.0025; /* of the command's range: an answer
 
 static const int64_t ATTEND_EVERY = 4096; /* attempted steps; some ten milliseconds */
 
+static const double ONE = 1e-12; /* Of a period: corners nearer than that are one. */
+
+typedef bool Announce(double);
+
 static Lead *run; /* the one under way, or NULL */
 int loop_sent;
 static int64_t late; /* ms; when Python is to be called again, at the latest */
@@ -214,6 +218,24 @@ double cut(double step, double time, double end)
     return left > ON_TIME && left < step - ON_TIME ? left : step;
 }
 
+/* ngspice sets the next edge of a PULSE only if a step was cut to end on this one, to 1e-7 of the width.
+   A step that ends there by itself loses all further ones in silence, and so does the rounding of times
+   with a narrow one, as a triangle has it. So they are announced here, two ahead. */
+void announce(Pulses *pulses, double time)
+{
+    for (Pulse *p = pulses->all; p < pulses->all + pulses->n; p++)
+        while (p->previous <= time && p->announced <= pulses->duration) {
+            p->previous = p->announced;
+            if (++p->corner == p->n) {
+                p->corner = 0;
+                p->cycle += 1.0;
+            }
+            p->announced = p->delay + p->cycle * p->period + p->corners[p->corner];
+            if (p->announced > time && p->announced - p->previous > ONE * p->period)
+                ((Announce *)pulses->announce)(p->announced);
+        }
+}
+
 /* The values that were sent last stand where the next row of the log begins to be filled. */
 static double accepted(Lead *c, double time, double next_step)
 {
@@ -233,6 +255,7 @@ static double accepted(Lead *c, double time, double next_step)
     write_down(c, time, emf);
     c->given += 0.5 * (c->emf + emf) * h;
     c->emf = emf;
+    announce(&c->pulses, time);
     if (time <= 0.0)
         return c->after_jump;
     c->segment.charge += 0.5 * (c->current + current) * h;

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.circuit import ngspice
+from cosim.circuit.joined import Edges
 from cosim.circuit.netlist import MOTIONAL, prepare
 from cosim.coupling.loop.recorder import Recorder
 from cosim.coupling.loop.structures import (
@@ -20,6 +21,7 @@ from cosim.coupling.loop.structures import (
     NOT_FINITE,
     UNKNOWN_SOURCE,
     LeadState,
+    Pulse,
     address,
     callback,
 )
@@ -62,12 +64,12 @@ class Lead(ngspice.Leader):
         scene: Scene,
         command: Command,
         recorder: Recorder,
-        deck: tuple[str, dict[str, str]] | None = None,
+        deck: tuple[str, dict[str, str], Edges] | None = None,
     ) -> None:
-        """``deck`` and its saved vectors replace the scene's."""
+        """``deck``, its saved vectors and its edges replace the scene's."""
         self._duration = scene.run.duration
         self._recorder = recorder
-        self._deck, vectors = deck or prepare(scene)
+        self._deck, vectors, self._edges = deck or prepare(scene)
         self._saved, self._vectors = tuple(vectors), tuple(vectors.values())
         width = len(LOG) + len(self._saved)
         self._log = Tape(width)
@@ -125,6 +127,10 @@ class Lead(ngspice.Leader):
             raise self._recorder.failure()
         finished(state, self._time, self._duration)
 
+    def loaded(self, engine: ngspice.Engine) -> None:
+        """Pass on the corners of PULSE sources."""
+        self._pulses = told_of(self.state.pulses, engine, self._edges, self._duration)
+
     @property
     def steps(self) -> int:
         """Steps that ngspice accepted."""
@@ -153,6 +159,34 @@ class Lead(ngspice.Leader):
         self._log.append(self._block[:filled])
         self.state.n_log = 0
         self._recorder.tell()
+
+
+def told_of(pulses: Any, engine: ngspice.Engine, edges: Edges, duration: float) -> Any:
+    """Fill the structure ``pulses`` with the corners of a run's PULSE sources; the array to keep
+    alive as long."""
+    found = (engine.ask(f"@{name}[pulse]") for name in edges.pulses)
+    each = [_pulse(values, duration, edges.length) for values in found if len(values) > 2]
+    kept = (Pulse * max(len(each), 1))(*each)
+    pulses.all, pulses.n, pulses.duration = ctypes.addressof(kept), len(each), duration
+    pulses.announce = engine.address("ngSpice_SetBkpt")
+    return kept
+
+
+def _pulse(values: list[float], duration: float, edge: float) -> Any:
+    """A PULSE source's corners in a period (s), from ngspice's values (low, high, delay, rise,
+    fall, width, period) with ngspice's defaults for those not given: the length of an ``edge``, and
+    the run's."""
+    given = dict(enumerate(values))
+    delay, rise, fall = (given.get(k, 0.0) for k in (2, 3, 4))
+    rise, fall = rise or edge, fall or edge
+    width = given.get(5) or duration
+    period = given.get(6) or 2.0 * (duration + rise + width + fall)
+    corners = [0.0, rise, rise + width, rise + width + fall]
+    inside = [corner for corner in corners if corner < period]
+    pulse = Pulse(delay=delay, period=period, n=len(inside), corner=-1)
+    pulse.corners[: len(inside)] = inside
+    pulse.previous = pulse.announced = -np.inf
+    return pulse
 
 
 def after_jump(scene: Scene) -> float:

@@ -155,6 +155,23 @@ enum { LOG_TIME, LOG_EMF, LOG_OWED, LOG_SAVED };
 /* Places among the saved values: REQUIRED in cosim/circuit/netlist.py. */
 enum { CURRENT, OUTPUT };
 
+/* The edges of a PULSE, which ngspice can lose; see announce(). */
+typedef struct {
+    double delay, period, corners[4]; /* s; corners since the beginning of a period */
+    int64_t n;                        /* of corners */
+    double cycle;                     /* of the one that was announced last */
+    int64_t corner;
+    double previous, announced;       /* s; the last two */
+} Pulse;
+
+/* All of a run. */
+typedef struct {
+    Pulse *all;
+    int64_t n;
+    AnyFunction announce;             /* ngspice's */
+    double duration;                  /* s */
+} Pulses;
+
 typedef struct Lead {
     Recorder *recorder;
     void (*macro_point)(struct Lead *); /* see above; Python's takes no notice of the argument */
@@ -197,6 +214,7 @@ typedef struct Lead {
     int64_t status;
     int64_t stopped;              /* by Python: nothing is to be done any more */
     char source[64];              /* name of the one that nothing feeds */
+    Pulses pulses;
     char names[5][64];            /* of the back-EMF, its gain, the command, the DAC and the pin */
     void (*attend)(void);         /* empties the log */
 } Lead;
@@ -211,6 +229,7 @@ EXPORT void lead_begin(Lead *c);
 EXPORT void lead_finish(Lead *c);
 
 double cut(double step, double time, double end);
+void announce(Pulses *pulses, double time);
 
 /* --- ports.c: a circuit and FMUs of the user's own; ngspice leads --- */
 
@@ -289,15 +308,6 @@ typedef struct {
     int64_t wrong;
 } Slope;
 
-/* The edges of a PULSE, which ngspice can lose; see announce(). */
-typedef struct {
-    double delay, period, corners[4]; /* s; corners since the beginning of a period */
-    int64_t n;                        /* of corners */
-    double cycle;                     /* of the one that was announced last */
-    int64_t corner;
-    double previous, announced;       /* s; the last two */
-} Pulse;
-
 typedef struct Ports {
     Stranger *fmus;            /* in the order in which they step */
     int64_t n_fmus;
@@ -314,8 +324,7 @@ typedef struct Ports {
     Pieces drive;
     double jump;               /* s; the drive's next one */
     int64_t driven;            /* whether a port is from it */
-    Pulse *pulses;
-    int64_t n_pulses;
+    Pulses pulses;
     Through *throughs;
     int64_t n_throughs;
     Slope *slopes;
@@ -335,7 +344,7 @@ typedef struct Ports {
     double tolerance;          /* of that agreement, relative to the source's largest value */
     const char *const *asked;  /* what ngspice is asked for an attempt's saved values */
     int64_t n_probed;          /* of these, the first ones, lead to FMUs */
-    AnyFunction command, ask, plot, announce; /* ngspice's */
+    AnyFunction command, ask, plot; /* ngspice's */
     char plot_name[64];
     double *log, *points;      /* rows: time, sources, saved values; time, outputs */
     int64_t n_log, n_points, log_rows;

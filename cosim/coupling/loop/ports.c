@@ -59,11 +59,8 @@ static const double NOISE = 1e-3, FAR = 0.3;
 
 enum { WRONG = 12, RIGHT = 4 }; /* so many wrong changes tell; so many of them a right one outweighs */
 
-static const double ONE = 1e-12; /* Of a period: corners nearer than that are one. */
-
 typedef int Command(const char *);
 typedef char *PlotName(void);
-typedef bool Announce(double);
 typedef struct {
     char *name;
     int type;
@@ -464,23 +461,6 @@ static void begin_exchange(Ports *c)
     write_point(c, time);
 }
 
-/* ngspice sets the next edge of a PULSE only if a step was cut to end on this one. A step that ends
-   there by itself loses all further ones in silence. So they are announced here, two ahead. */
-static void announce(Ports *c, double time)
-{
-    for (Pulse *p = c->pulses; p < c->pulses + c->n_pulses; p++)
-        while (p->previous <= time && p->announced <= c->duration) {
-            p->previous = p->announced;
-            if (++p->corner == p->n) {
-                p->corner = 0;
-                p->cycle += 1.0;
-            }
-            p->announced = p->delay + p->cycle * p->period + p->corners[p->corner];
-            if (p->announced > time && p->announced - p->previous > ONE * p->period)
-                ((Announce *)c->announce)(p->announced);
-        }
-}
-
 static double *log_row(const Ports *c)
 {
     return c->log + c->n_log * (1 + c->n_sources + c->n_saved);
@@ -539,7 +519,7 @@ static double accepted(Ports *c, double time, double next_step)
         if (meets)
             begin_exchange(c);
     }
-    announce(c, time);
+    announce(&c->pulses, time);
     if (time <= 0.0 || at_jump)
         c->jumped = time;
     next_step = fmin(next_step, c->after_jump + GROWTH * (time - c->jumped));

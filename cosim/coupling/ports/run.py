@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 
 from cosim.circuit import ngspice
-from cosim.coupling.loop.lead import after_jump, engine, finished
+from cosim.coupling.loop.lead import after_jump, engine, finished, told_of
 from cosim.coupling.loop.structures import (
     FMU_FAILED,
     NO_AGREEMENT,
     Back,
     PortsState,
-    Pulse,
     Slope,
     Source,
     StrangerState,
@@ -206,19 +205,11 @@ class Run(ngspice.Leader):
 
     def loaded(self, engine: ngspice.Engine) -> None:
         """Pass on the addresses of ngspice's functions, and the corners of PULSE sources."""
-        state, run = self.state, self._scene.run
+        state = self.state
         state.command = engine.address("ngSpice_Command")
         state.ask = engine.address("ngGet_Vec_Info")
         state.plot = engine.address("ngSpice_CurPlot")
-        state.announce = engine.address("ngSpice_SetBkpt")
-        found = [engine.ask(f"@{name}[pulse]") for name in self.deck.pulses]
-        pulses = [
-            _pulse(values, run.duration, self.deck.edge or 0.0)
-            for values in found
-            if len(values) > 2
-        ]
-        self._pulses = _array(Pulse, pulses)
-        state.pulses, state.n_pulses = ctypes.addressof(self._pulses), len(pulses)
+        self._pulses = told_of(state.pulses, engine, self.deck.edges, self._scene.run.duration)
 
     def _attend(self) -> None:
         """Take the logs away."""
@@ -246,20 +237,3 @@ class Run(ngspice.Leader):
 def _array(kind: Any, values: Sequence[Any] = (), length: int = 0) -> Any:
     """A C array of values, or of zeros; it has one element at least, as C knows no empty array."""
     return (kind * max(len(values), length, 1))(*values)
-
-
-def _pulse(values: list[float], duration: float, edge: float) -> Any:
-    """A PULSE source's corners in a period (s), from ngspice's values (low, high, delay, rise,
-    fall, width, period) with ngspice's defaults for those not given: the length of an ``edge``, and
-    the run's."""
-    given = dict(enumerate(values))
-    delay, rise, fall = (given.get(k, 0.0) for k in (2, 3, 4))
-    rise, fall = rise or edge, fall or edge
-    width = given.get(5) or duration
-    period = given.get(6) or 2.0 * (duration + rise + width + fall)
-    corners = [0.0, rise, rise + width, rise + width + fall]
-    inside = [corner for corner in corners if corner < period]
-    pulse = Pulse(delay=delay, period=period, n=len(inside), corner=-1)
-    pulse.corners[: len(inside)] = inside
-    pulse.previous = pulse.announced = -np.inf
-    return pulse
