@@ -66,6 +66,7 @@ def refuse_unknown(scene: Scene, names: Iterable[str]) -> None:
 
     refuse_missing(scene)
     scene = changed(scene, dict.fromkeys(own, 0.0), "--over")
+    scene = scene.of(scene.origin, dict.fromkeys(own, "--over"))
     if scene.circuit.param and not scene.rung.ngspice:
         raise BadInput(
             f'--over {own[0]}: moves nothing with circuit.model = "{scene.circuit.model}", whose '
@@ -86,4 +87,4 @@ def _known(asked: Sequence[tuple[str, str]], progress: Any) -> None:
     from cosim.coupling.ports.strangers import stranger
 
     for file, name in asked:
-        stranger(file).settable(name.split(".", 2)[2], f"--over {plain(name)}")
+        stranger(file).settable(name.split(".", 2)[2], plain(name))

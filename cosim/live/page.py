@@ -57,7 +57,7 @@ def opened(scene: str, overrides: Iterable[str] = ()) -> tuple[str, dict[str, di
     link, known = to_link(found), rigs.turned()
     for key in (pair.partition("=")[0] for pair in link.split("&")[1:]):
         if key not in known and not key.startswith(("run.", "coupling.")):
-            raise BadInput(f"{found.origin}: the page cannot turn {plain(key)}.")
+            raise found.bad(f"the page cannot turn {plain(key)}.")
     return link, circuits
 
 

@@ -92,11 +92,13 @@ def load(source: "Scene | str | os.PathLike[str]", overrides: Overrides | None =
         changes = _Layer("overrides", _tables(overrides.items(), "overrides"))
     else:
         changes = _Layer("--set", _tables(_parsed(overrides or ()), "--set"))
+    given = source.given if isinstance(source, Scene) else {}
     if changes.tables:
         layers.append(changes)
+        given = {**given, **dict.fromkeys(_origins([changes]), changes.origin)}
     scene = _checked(layers, base)
     _tell_doubts(scene, layers)
-    return scene.of(base)
+    return scene.of(base, given)
 
 
 def changed(scene: Scene, values: Mapping[str, float | int | str | None], origin: str) -> Scene:
@@ -111,7 +113,7 @@ def changed(scene: Scene, values: Mapping[str, float | int | str | None], origin
         made = Scene.model_validate(vars(scene) | _merge([_Layer("", below), layer]))
     except ValidationError:
         made = _checked([_Layer(scene.origin, scene.as_dict()), layer], origin)
-    return made.of(scene.origin)
+    return made.of(scene.origin, scene.given)
 
 
 def _layers(source: str) -> list[_Layer]:

@@ -2,7 +2,8 @@
 
 import json
 import os
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import ceil, inf
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
+from cosim.errors import BadInput
 from cosim.scene import firmware
 from cosim.scene.describe import KEYS, Key, keys
 from cosim.scene.rungs import OF_PORTS, RUNGS, Rung
@@ -90,6 +92,8 @@ class Origin:
     """Where a scene is from; equal scenes may be from different files."""
 
     words: str = field(default="", compare=False)
+    given: Mapping[str, str] = field(default_factory=dict[str, str], compare=False)
+    """Keys that were given on top of the file, and by what: ``--set``."""
 
 
 class Scene(BaseModel):
@@ -365,10 +369,26 @@ class Scene(BaseModel):
         """The file that the scene is from, or its name, as messages begin with it."""
         return self._origin.words or f"scene {self.name}"
 
-    def of(self, origin: str) -> "Scene":
-        """This scene, with another :attr:`origin`."""
-        self._origin = Origin(origin)
+    @property
+    def given(self) -> Mapping[str, str]:
+        """The keys that were given on top of the file, and by what: ``--set``."""
+        return self._origin.given
+
+    def of(self, origin: str, given: Mapping[str, str]) -> "Scene":
+        """This scene, with another :attr:`origin` and :attr:`given`."""
+        self._origin = Origin(origin, given)
         return self
+
+    def bad(self, words: str) -> BadInput:
+        """A fault in a sentence that begins with the option that gave the key it tells of, else
+        with :attr:`origin`."""
+        for key, option in self.given.items():
+            name = re.escape(key)
+            if key.startswith("fmu."):  # where FMUs are read, theirs are told without its name
+                name += rf"|parameters {re.escape(key.split('.', 2)[2])}"
+            if re.search(rf"\b({name})(?![\w.])", words):
+                return BadInput(f"{option}: {words}")
+        return BadInput(f"{self.origin}: {words}")
 
     @property
     def period(self) -> float:

@@ -56,20 +56,20 @@ def refuse_missing(scene: Scene) -> None:
     """Raise BadInput for a file that the scene names and that is not there."""
     for key, path in scene.files.items():
         if not os.path.exists(path) and (key != "circuit.netlist" or scene.rung.own_netlist):
-            words = f'{plain(key)} = "{plain(path)}": there is no such file'
-            raise BadInput(f"{scene.origin}: {words}.")
+            raise scene.bad(f'{plain(key)} = "{plain(path)}": there is no such file.')
 
 
 @contextmanager
 def told(scene: Scene) -> Iterator[None]:
-    """Within this context a BadInput names the scene, too, unless it names a netlist's line: ports,
-    ``circuit.save`` and parameters are checked where netlist and FMUs are read."""
+    """Within this context a BadInput names the scene, or the option that gave the key at fault,
+    too, unless it names a netlist's line: ports, ``circuit.save`` and parameters are checked where
+    netlist and FMUs are read."""
     try:
         yield
     except BadInput as error:
         if not scene.rung.own_netlist or re.match(r".*?:\d+: ", str(error)):
             raise
-        raise BadInput(f"{scene.origin}: {error}") from error
+        raise scene.bad(str(error)) from error
 
 
 @contextmanager

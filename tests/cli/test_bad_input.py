@@ -221,6 +221,54 @@ def test_source(source: str, part: str, tmp_path: Path, monkeypatch: pytest.Monk
     assert part in complaint(source)
 
 
+NONE, OWN = '[circuit]\nmodel = "none"', '[circuit]\nmodel = "file"\nnetlist = "{}.cir"\n'
+STILL = 'circuit.model = "none" '
+
+
+@pytest.mark.parametrize(
+    ("command", "file", "option", "words"),
+    [
+        ("chart limits", NONE, "circuit.model=none", STILL + "has no limits to change;"),
+        (
+            *("chart limits", '[drive]\nwaveform = "sine"', "drive.waveform=sine"),
+            'drive.waveform = "sine" has no knobs to search.',
+        ),
+        ("chart ladder", NONE, "circuit.model=none", STILL + "is no rung of the ladder;"),
+        (
+            *("tune --minimise=v_average", NONE + '\n[drive]\nwaveform = "optimal"', ""),
+            'drive.waveform = "optimal" has no knobs; name what to tune',
+        ),
+        ("run --spread", NONE, "circuit.model=none", STILL + "has no knobs that"),
+        (
+            *("run", OWN.format("own") + "param = { zz = 3 }", "circuit.param.zz=3"),
+            "own.cir: circuit.param.zz must be one of its .param",
+        ),
+        ("sweep", OWN.format("own"), "circuit.param.zz=1,2", "own.cir: circuit.param.zz must be"),
+        ("run", OWN.format("no"), "", 'no.cir": there is no such file'),
+    ],
+)
+def test_a_fault_is_told_with_the_scenes_file_or_the_option(
+    command: str,
+    file: str,
+    option: str,
+    words: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "own.toml", "--kind=circuit"]) == 0
+    Path("own.toml").write_text(f'base = "paper-limited"\n{file}\n')
+    how, by_file = ("--over" if command == "sweep" else "--set"), command != "sweep"
+    found = [[]] * by_file + [[how, option]] * bool(option)
+    for more in found:
+        base = "paper-limited" if more and "param" not in option else "own.toml"
+        capsys.readouterr()
+        assert main([*command.split(), base, *more]) == 2
+        said = capsys.readouterr().err
+        assert said.startswith(f"cosim: {more[0] if more else 'own.toml'}: ") and words in said
+
+
 def test_directory(tmp_path: Path) -> None:
     assert complaint(tmp_path) == f"{tmp_path}: cannot be read (it is a directory)."
 

@@ -166,11 +166,11 @@ def test_a_sweep_over_a_parameter_tells_a_missing_file_as_a_run_does(
 @pytest.mark.parametrize(
     ("key", "said"),
     [
-        ("circuit.param.R9", r"R9 must be one of its \.param \(it has vdd\)"),
-        ("fmu.rotor.K", r"--over fmu\.rotor\.K must be one of its parameters"),
+        ("circuit.param.R9", r"bridge\.cir: \S+R9 must be one of its \.param \(it has vdd\)"),
+        ("fmu.rotor.K", r"Rotor\.fmu: fmu\.rotor\.K must be one of its parameters"),
     ],
 )
-def test_a_sweep_over_what_is_not_there_names_the_scene_and_what_its_user_knows(
+def test_a_sweep_over_what_is_not_there_names_the_option_and_what_its_user_knows(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], key: str, said: str
 ) -> None:
     """The reader has parameters of its own for a filter in s."""
@@ -178,7 +178,7 @@ def test_a_sweep_over_what_is_not_there_names_the_scene_and_what_its_user_knows(
     own = "E9 q 0 LAPLACE {V(gp)} {1/(1+1m*s)}\nR9 q 0 1k\n.end"
     netlist.write_text(netlist.read_text().replace(".end", own))
     assert main(["sweep", str(scene), "--over", f"{key}=1,2", "--out", str(tmp_path / "o")]) == 2
-    assert re.match(rf"cosim: {scene}: .*{said}", capsys.readouterr().err)
+    assert re.match(rf"cosim: --over: {tmp_path}/{said}", capsys.readouterr().err)
 
 
 KIND = (
@@ -443,7 +443,7 @@ def test_macro_steps_have_one_length_to_the_bit(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("key", "said"),
     [
-        ("fmu.rotor.K", r"Rotor\.fmu: --over fmu\.rotor\.K must .* \(it has J, B, "),
+        ("fmu.rotor.K", r"--over: .*Rotor\.fmu: fmu\.rotor\.K must .* \(it has J, B, "),
         ("fmu.motor.J", r"fmu\.motor\.J: there is no such FMU \(known: rotor\)"),
         ("circuit.param.X", r"bridge\.cir: circuit\.param\.X must .* \(it has vdd\)"),
         ("circuit.param", r"circuit\.param: this key is not a number"),

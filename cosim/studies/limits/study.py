@@ -268,11 +268,10 @@ def _is_own(scene: Scene, rig: Settings) -> bool:
 def checked(scene: Scene) -> None:
     """Refuse a scene that cannot be studied. Raises BadInput."""
     if not scene.rung.on_ladder:
-        raise BadInput(
-            f'scene {scene.name}: circuit.model = "{scene.circuit.model}" has no limits to change; '
+        raise scene.bad(
+            f'circuit.model = "{scene.circuit.model}" has no limits to change; '
             'it must be "full", "amplifier", "limited", "ideal" or "auto".'
         )
     if scene.drive.waveform != "sawtooth":
-        raise BadInput(
-            f'scene {scene.name}: drive.waveform = "{scene.drive.waveform}" has no knobs to search.'
-        )
+        words = f'drive.waveform = "{scene.drive.waveform}" has no knobs to search.'
+        raise scene.bad(words)

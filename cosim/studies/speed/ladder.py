@@ -9,7 +9,7 @@ from math import ceil, nan
 from statistics import median
 from typing import Any
 
-from cosim.errors import BadInput, SimulationFailed
+from cosim.errors import SimulationFailed
 from cosim.evaluate.point import in_whole_periods
 from cosim.evaluate.store import Store, hashed, reported
 from cosim.files.picture import Picture
@@ -90,8 +90,8 @@ def cheapest(rungs: list[Rung], tolerance: float) -> Rung:
 def _on(scene: Scene, model: str) -> Scene:
     """The scene on the rung ``model``, in whole periods, with three rows of output."""
     if not scene.rung.on_ladder:
-        raise BadInput(
-            f'scene {scene.name}: circuit.model = "{scene.circuit.model}" is no rung of the '
+        raise scene.bad(
+            f'circuit.model = "{scene.circuit.model}" is no rung of the '
             f"ladder; it must be one of {', '.join(RUNGS)} or auto."
         )
     # The command of "full" is the firmware's staircase; the other rungs follow its smooth ramp.
@@ -99,7 +99,7 @@ def _on(scene: Scene, model: str) -> Scene:
     settings: dict[str, Any] = {"circuit.model": model, "drive.pwm_ripple": False}
     if staircase and not scene.drive.reset_time:
         settings["drive.quantised"] = True
-    run = in_whole_periods(changed(scene, settings, f"scene {scene.name}"))
+    run = in_whole_periods(changed(scene, settings, scene.origin))
     return run.having(run={"output_step": run.run.duration / 2.0})
 
 

@@ -112,10 +112,8 @@ def tune(
     if not over and not (shaped and scene.rung.driven):
         key = "circuit.model" if shaped else "drive.waveform"
         still = scene.circuit.model if shaped else scene.drive.waveform
-        raise BadInput(
-            f'scene {scene.name}: {key} = "{still}" has no knobs; name what to tune with '
-            "--over table.key=low:high."
-        )
+        words = "has no knobs; name what to tune with --over table.key=low:high."
+        raise scene.bad(f'{key} = "{still}" {words}')
     keys = _checked(over or KNOBS)
     refuse_unknown(scene, keys)
     most = most_heat(scene, heat)

@@ -142,10 +142,8 @@ def turns(scene: Scene) -> list[Settings]:
     if scene.has_ports:
         raise BadInput(f"{scene.origin}: --spread turns knobs of the built-in machine.")
     if not scene.rung.driven:
-        raise BadInput(
-            f'scene {scene.name}: circuit.model = "{scene.circuit.model}" has no knobs that '
-            "--spread could turn."
-        )
+        words = f'circuit.model = "{scene.circuit.model}" has no knobs that --spread could turn.'
+        raise scene.bad(words)
     found = []
     for knob, name in KNOBS.items():
         given = getattr(scene.drive, knob) is not None
