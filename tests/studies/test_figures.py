@@ -28,7 +28,7 @@ RESULTS = Path(__file__).parents[2] / "results"
 def read(kind: type[Any], name: str) -> list[Any]:
     types = get_type_hints(kind)
     with (RESULTS / name).open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
+        rows = [{k.partition(" [")[0]: x for k, x in row.items()} for row in csv.DictReader(file)]
     names = [field.name for field in fields(kind)]
     return [kind(**{name: types[name](row[name]) for name in names}) for row in rows]
 
@@ -90,6 +90,8 @@ def test_a_false_limit_cycle_is_marked_and_not_joined(drawn: list[Figure], tmp_p
 
 def test_every_limit_is_drawn_and_in_the_page(drawn: list[Figure], tmp_path: Path) -> None:
     stability.report(read(Limit, "stability.csv")).save(tmp_path)
+    table = (tmp_path / "stability.csv").read_text(encoding="utf-8")
+    assert table == (RESULTS / "stability.csv").read_text(encoding="utf-8")
     page = (tmp_path / "stability.md").read_text(encoding="utf-8")
     assert page.count("\n") <= 60 and all(f"| {name} " in page for name in METHODS)
     legend = drawn[0].axes[0].get_legend()

@@ -344,6 +344,7 @@ def test_the_same_seed_gives_the_same_and_an_interrupted_run_goes_on(
         assert f": {words}" in titles
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert {"identify.json", "identify.csv", "identify.md", "rig.toml", "trial-04.toml"} <= names
+    assert "amplitude [V],offset [V],phase," in (tmp_path / "out" / "identify.csv").read_text()
     loaded = cosim.load(tmp_path / "out" / "trial-04.toml")
     mass = whole.rig["mechanics.surface_mass"]
     assert loaded.mechanics.surface_mass == pytest.approx(mass, rel=1e-5)

@@ -64,8 +64,8 @@ def test_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with open(tmp_path / "tune.csv", encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == numbers["runs"] <= 40
-    assert numbers["value"] in [float(row["v_average"]) for row in rows]
-    best_seen = max(float(row["v_average"]) for row in rows)
+    assert numbers["value"] in [float(row["v_average [m/s]"]) for row in rows]
+    best_seen = max(float(row["v_average [m/s]"]) for row in rows)
     assert best_seen == numbers["value"]
     assert {path.name for path in tmp_path.iterdir()} == {
         "tune.json", "tune.csv", "best.toml", "figure.png",
@@ -274,6 +274,7 @@ def test_runs_of_all_waveforms_are_written(tmp_path: Path) -> None:
     with (tmp_path / "tune.csv").open(newline="") as file:
         first, second = csv.DictReader(file)
     assert (first["drive.duty [1]"], first["drive.table.1 [1]"]) == ("0.3", "")
+    assert (first["v_average [m/s]"], second["v_average [m/s]"]) == ("1.0", "")
     assert (second["drive.duty [1]"], second["drive.table.1 [1]"]) == ("", "0.1")
 
 

@@ -204,6 +204,13 @@ class Limit:
     observed: float
 
 
+UNITS = {
+    name: f"{name} [{unit}]"
+    for name, unit in (("strength", "1/s"), ("predicted", "s"), ("observed", "s"))
+}
+"""Heads of its columns that have a unit."""
+
+
 def predicted(method: str, regime: Regime) -> float:
     """Largest stable macro step, s; LONGEST where there is no limit below it."""
     make, shortest = METHODS[method].make, _SHORTEST[regime.cut]
@@ -296,7 +303,8 @@ def report(found: Sequence[Limit]) -> Report:
         for cut in dict.fromkeys(x.cut for x in found)
     }
     return Report(
-        "stability", "Stability of the coupling methods", [asdict(limit) for limit in found],
+        "stability", "Stability of the coupling methods",
+        [{UNITS.get(name, name): x for name, x in asdict(limit).items()} for limit in found],
         notes, tables, {"": partial(draw, driven, free, message)}, message,
     )  # fmt: skip
 

@@ -261,9 +261,10 @@ def write_runs(path: Path, runs: Sequence[Run], quantity: str) -> None:
     if runs:
         names = dict.fromkeys(name for run in runs for name in run.values)
         heads = {name: f"{name} [{numeric_key(name).unit}]" for name in names}
+        value = f"{quantity} [{meaning(quantity)['units']}]"
         rows = [
             {head: run.values.get(name) for name, head in heads.items()}
-            | {quantity: run.value, "failure": run.outcome.failure}
+            | {value: run.value, "failure": run.outcome.failure}
             for run in runs
         ]
         write_csv(path, rows)

@@ -7,6 +7,7 @@ from typing import Any
 from cosim.evaluate.keys import numeric_key
 from cosim.files.atomic import write_json, write_text
 from cosim.studies.identify.problem.gauges import GAUGES
+from cosim.studies.identify.problem.space import OWN_KEYS
 from cosim.studies.identify.report import figures
 from cosim.studies.identify.report.scenes import rounded, scene_file, trial_settings
 from cosim.studies.identify.report.solved import Solved
@@ -55,10 +56,12 @@ def write(folder: Path, found: Solved) -> None:
     """Write all files that :meth:`Identification.save` names."""
     numbers, rig = found.numbers, rounded(found.rig)
     rows = [*numbers["trials"], *numbers["apart"]]
-    names = dict.fromkeys(name for row in rows for name in row)
+    names = {name: name for row in rows for name in row}
+    names |= {own: label(own, numeric_key(key).unit) for key, own in OWN_KEYS.items()}
+    names["lift"] = "lift"  # a share
     Report(
         *("identify", "The identified rig"),
-        [{name: row.get(name) for name in names} for row in rows],
+        [{head: row.get(name) for name, head in names.items()} for row in rows],
         [*NOTES, *_priors(found), *findings(numbers)],
         tables(numbers),
         {f"-{name}": partial(draw, found) for name, draw in figures.FIGURES.items()},
