@@ -5,7 +5,7 @@ expression, which an added B source computes as its voltage.
 """
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -82,18 +82,20 @@ def deck(
     max_step: float,
     asked: bool,
     known: Mapping[str, float],
-    called: tuple[str, str] = ("[[port]] source", "probe or circuit.save"),
+    called: tuple[str, str] = ("[[port]] source", "[[port]] probe"),
     through: Sequence[tuple[str, str]] = (),
+    saved: Collection[str] = (),
 ) -> Deck:
     """The deck of a netlist in which the ``sources`` are external and the ``words`` are saved; if
     ``asked`` for within a step, each word is also a device's parameter. ``known`` are values for
     ``.param`` lines that the netlist may have, ``parameters`` for those that it must have. For each
     source and word of ``through`` the circuit adds the word, times the external source
-    ``Vcosim_gain`` with the pair's number, to the source. Messages use the names ``called``.
+    ``Vcosim_gain`` with the pair's number, to the source. Messages use the names ``called``, but
+    ``circuit.save`` for words ``saved``.
 
     Raises BadInput: for the netlist with its line, for the rest with what is wrong in the scene.
     """
-    netlist = checked(path, sources, words, asked=asked, called=called)
+    netlist = checked(path, sources, words, asked=asked, called=called, saved=saved)
     top = netlist.top
     values = {**known, **own_parameters(top, plain(path), parameters)}
     fed = {source.lower() for source in sources}
@@ -231,11 +233,13 @@ def checked(
     required: Sequence[Sequence[str]] | None = None,
     kinds: str = "vi",
     asked: bool = False,
-    called: tuple[str, str] = ("[[port]] source", "probe or circuit.save"),
+    called: tuple[str, str] = ("[[port]] source", "[[port]] probe"),
+    saved: Collection[str] = (),
 ) -> Checked:
     """Read a netlist in which the ``sources`` are of these ``kinds``, and to which sources are
     added that read the ``words`` and those of its measurements; of the alternatives ``required``,
-    else the ``sources``, one must be there. Raises BadInput."""
+    else the ``sources``, one must be there. Raises BadInput, for words with the name ``called`` or,
+    if they are ``saved``, ``circuit.save``."""
     lines, dropped = read(path)
     asks, top, name = measures(dropped), parse(lines), plain(path)
     found = {element.name: element for element in top.elements}
@@ -247,11 +251,13 @@ def checked(
                 hint = "; the first line of the netlist, where it stands, is the title"
             must = f"must be a {' or '.join(kinds.upper())} source of its own"
             raise BadInput(ended(f'{name}: {called[0]} = "{plain(source)}" {must}{hint}'))
+    every: dict[str, Line] = {}
     for each in words:
+        key = "circuit.save" if each in saved else called[1]
+        every[each] = Line(each, f'{name}: {key} = "{plain(each)}"', 0)
         if not each.strip():
-            what = f'{called[1]} = "{plain(each)}" must be a vector or an expression of the netlist'
-            raise BadInput(f"{name}: {what}.")
-    every = {each: Line(each, f'{name}: {called[1]} = "{plain(each)}"', 0) for each in words}
+            what = "must be a vector or an expression of the netlist"
+            raise BadInput(f"{every[each].place} {what}.")
     for ask in asks:
         every |= {each: replace(ask.line, text=each) for each in ask.words if each not in every}
     read_as = reading([*every], len(words) if asked else 0)

@@ -6,7 +6,7 @@ scene's analysis and ``reltol`` replace the netlist's; its other options stay. A
 is treated alike; ``circuits/README.md`` says what it must have.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -76,7 +76,7 @@ def prepare(scene: Scene) -> tuple[str, dict[str, str], Edges]:
         netlist = _packaged(path)
     else:  # read anew each time, as the file may have changed
         asked = (*words.values(), *(scene.circuit.save or ()))
-        netlist = _checked(path, scene.renamed, asked)
+        netlist = _checked(path, scene.renamed, asked, scene.circuit.save or ())
         words |= {f"{OWN}{each}": each for each in netlist.words}
     title, elements = netlist.title, netlist.top.elements
     external = _external_sources(elements, scene.renamed)
@@ -110,9 +110,11 @@ def _words(scene: Scene) -> dict[str, str]:
     return {ends[end]: name for end, name in scene.renamed.items() if end in ends}
 
 
-def _checked(path: Path, renamed: Mapping[str, str], words: tuple[str, ...]) -> Checked:
+def _checked(
+    path: Path, renamed: Mapping[str, str], words: Sequence[str], saved: Collection[str] = ()
+) -> Checked:
     sources = [renamed[end] for end in _SOURCES if renamed]
-    return checked(path, sources, words, None if renamed else AGREED, "v")
+    return checked(path, sources, words, None if renamed else AGREED, "v", saved=saved)
 
 
 @cache

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.arrays import Array
+from cosim.arrays import Array, drawable
 from cosim.errors import BadInput, plain
 from cosim.files import reader
 from cosim.files.atomic import tidy, whole
@@ -66,7 +66,7 @@ def _read(results: Path) -> tuple[dict[str, Any], list[Run]]:
     """The data of the page's script, and the runs whose rows follow it."""
     if (results / "waveforms.nc").exists():
         found, scene = formats.read(results), load(results / "scene.toml")
-        runs = [[*found.waveforms.values()]]
+        runs = [[drawable(x, found.units[name]) for name, x in found.waveforms.items()]]
         with _whole_results(results / "summary.json") as summary:
             words = "\n\n".join([table(scene, summary, found.units), *summary.get("notes", [])])
         told = {"title": scene.name, "about": scene.description, "words": words}

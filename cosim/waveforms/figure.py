@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
-from cosim.arrays import Array
+from cosim.arrays import Array, drawable
 from cosim.files.picture import Picture, grid, legend_above
 from cosim.files.spill import release
 from cosim.scene import Scene
@@ -78,7 +78,8 @@ def draw_own(scene: Scene, waves: dict[str, Array], units: Mapping[str, str]) ->
     names = ranked[:MOST_PANELS]
     figure, axes = grid(len(names), 1 if len(names) < 4 else 2, 13.0, 1.9, 1.2)
     for axis, name in zip(axes, names, strict=True):
-        axis.plot(*_outline(waves["time"], waves[name]), color=SURFACE, lw=0.8)
+        times, values = _outline(waves["time"], waves[name])
+        axis.plot(times, drawable(values, units[name]), color=SURFACE, lw=0.8)
         if scene.run.settle > 0:
             axis.axvspan(0, scene.run.settle, color="0.93", zorder=0)
         axis.set(

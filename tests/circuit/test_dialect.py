@@ -639,11 +639,11 @@ def test_on_the_built_in_mechanics_it_is_told_too(tmp_path: Path) -> None:
     assert result.summary["meas.x"] > 0.0
 
 
-@pytest.mark.parametrize("node", ["n", "7"])
-def test_a_circuit_that_rings_is_told_with_its_node(tmp_path: Path, node: str) -> None:
+@pytest.mark.parametrize(("node", "part"), [("n", ""), ("7", ""), ("n", " Rser=-1")])
+def test_a_circuit_that_rings_is_told_with_its_node(tmp_path: Path, node: str, part: str) -> None:
     """50 MHz, on steps that ask for microseconds; the quiet node is a thousandth as much. ngspice
-    reads I(Ct) at a node that it calls 7_vmeas_0."""
-    tank = f"Rt in a 50\nLt a {node} 1u\nCt {node} 0 10p\nRq {node} q 1Meg\nCq q 0 1n\n"
+    reads I(Ct) at a node that it calls 7_vmeas_0, and has one within a coil with resistance."""
+    tank = f"Rt in a 50\nLt {node} a 1u{part}\nCt {node} 0 10p\nRq {node} q 1Meg\nCq q 0 1n\n"
     tank += "Bz in 0 I=I(Ct)\n"
     (tmp_path / "own.cir").write_text(
         "t\nV1 d 0 0\nVe in 0 PULSE(0 1 0 1n 1n 2u 4u)\nRd d 0 1\n" + tank + ".end\n"

@@ -3,6 +3,7 @@
 import json
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -15,7 +16,7 @@ from hypothesis import strategies as st
 
 import cosim
 from cosim.cli.main import main
-from cosim.live.show import BLOCK, _comparison, _table, show
+from cosim.live.show import BLOCK, _comparison, _read, _table, show
 from cosim.waveforms import formats
 from cosim.waveforms.storage import netcdf
 from tests.helpers.examples import examples
@@ -332,3 +333,16 @@ def test_a_waveform_whose_name_netcdf_cannot_have(tmp_path: Path) -> None:
     cosim.run("relay", settings).save(tmp_path)
     words = show(tmp_path).read_text(encoding="utf-8")
     assert "  v(d)/2  " in words and "  -v(d)  " in words
+
+
+def test_no_impact_in_sight_is_not_drawn(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """1e9 s made the panel a flat line."""
+    columns = {"time": np.arange(3.0), "rig.time_to_impact": np.array([1e9, 0.25, 1e9])}
+    result = cosim.run("relay", {"run.duration": 0.02, "run.settle": 0.0})
+    units = {"time": "s", "rig.time_to_impact": "s"}
+    monkeypatch.setattr("cosim.live.show.table", lambda *of: "")
+    replace(result, columns=columns, units=units).save(tmp_path)
+    _, told = _read(tmp_path)[0]["signals"]["columns"]
+    assert told["most"] == 0.25

@@ -98,6 +98,7 @@ class Plan:
             *(run.duration, circuit.reltol, circuit.max_step, self.method == "redo"),
             netlist.parameters(self.scene) if self._has_machine else {},
             through=[(self.names[t.source], self.words[t.probe]) for t, _ in self.throughs],
+            saved={*(circuit.save or ())} - {*self.probes},
         )
 
     def outputs(self) -> Iterator[tuple[Side, str, int, bool]]:

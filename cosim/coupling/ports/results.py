@@ -182,7 +182,7 @@ def _notes(run: Run, odd: list[str]) -> Iterator[str]:
         turns = {
             name: loop().ports_turns(k)
             for k, name in enumerate(engine().sent)
-            if not re.search("#|cosim_", name)
+            if not re.search(r"#|cosim_|_[rl]ser\b", name)  # nodes that no user has named
         }
         # A node that the user has named is clearer than one within a model, if it rings at all.
         node = max(turns, key=lambda n: turns[n] if "." not in n else turns[n] / _WITHIN)

@@ -199,7 +199,9 @@ class Stranger:
                 f"{where} has {found.size} values: write {found.name}[0] … [{found.size - 1}]"
             )
         if place >= found.size:
-            raise self.bad(f"{where}: its elements must be [0] … [{found.size - 1}]")
+            few = f"{found.name} has {'one value' if found.size else 'no values'}, no [{place}]"
+            many = f"its elements must be [0] … [{found.size - 1}]"
+            raise self.bad(f"{where}: {many if found.size > 1 else few}")
         return found, place
 
     def instance(self, parameters: Mapping[str, Any]) -> Interface:
