@@ -56,7 +56,9 @@ def refuse_missing(scene: Scene) -> None:
     """Raise BadInput for a file that the scene names and that is not there."""
     for key, path in scene.files.items():
         if not os.path.exists(path) and (key != "circuit.netlist" or scene.rung.own_netlist):
-            raise scene.bad(f'{plain(key)} = "{plain(path)}": there is no such file.')
+            words = f'{plain(key)} = "{plain(path)}": there is no such file'
+            cure = "a path counts from the scene's file, so move the two together"
+            raise scene.bad(f"{words}." if key in scene.given else f"{words}; {cure}.")
 
 
 @contextmanager

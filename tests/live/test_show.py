@@ -335,9 +335,7 @@ def test_a_waveform_whose_name_netcdf_cannot_have(tmp_path: Path) -> None:
     assert "  v(d)/2  " in words and "  -v(d)  " in words
 
 
-def test_no_impact_in_sight_is_not_drawn(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_impact_in_sight_is_not_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """1e9 s made the panel a flat line."""
     columns = {"time": np.arange(3.0), "rig.time_to_impact": np.array([1e9, 0.25, 1e9])}
     result = cosim.run("relay", {"run.duration": 0.02, "run.settle": 0.0})

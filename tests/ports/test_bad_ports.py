@@ -164,7 +164,8 @@ def test_a_sweep_over_a_parameter_tells_a_missing_file_as_a_run_does(
     for command in (["run", str(scene)], ["sweep", str(scene), "--over", "fmu.rotor.J=1,2"]):
         assert main([*command, "--out", str(tmp_path / "out")]) == 2
         told = capsys.readouterr().err
-        assert re.match(rf'cosim: {scene}: \S+ = "\S+{missing}": there is no such file\.$', told)
+        words = "there is no such file; a path counts from the scene's file, so move the two"
+        assert re.match(rf'cosim: {scene}: \S+ = "\S+{missing}": {words} together\.$', told)
 
 
 @pytest.mark.parametrize(
