@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from base64 import b64decode
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -134,7 +135,8 @@ LONG = range(10_000_000_000)
     ("over", "more", "words"),
     [
         ({1: [2]}, {}, "--over: 1 must be a key"),
-        (["coil.count=1,2"], {}, "a sweep needs at least one key and its values, such as --over"),
+        (["coil.count=1,2"], {}, "sweep: over = ['coil.count=1,2'] must be a mapping."),
+        ({}, {}, "a sweep needs at least one key and its values, such as --over"),
         ({"coil.count": 2}, {}, '--over: "coil.count" must be a key, 2 its numbers'),
         ({"coil.count": "12"}, {}, '"12" its numbers'),
         ({"coil.count": np.array(2)}, {}, "2 its numbers"),
@@ -152,7 +154,7 @@ LONG = range(10_000_000_000)
         ({"coil.count": [1, 2]}, {"samples": ENDLESS}, "must be a whole number from 1 to 1000000"),
         ({"coil.count": [1, 2]}, {"samples": 3, "seed": 1.5}, "--seed 1.5: must be a whole"),
     ],
-    ids=range(14),
+    ids=range(15),
 )
 def test_what_no_sweep_goes_over(over: Any, more: dict[str, Any], words: str) -> None:
     """Said before any work is done, or any memory taken."""
@@ -164,7 +166,7 @@ def test_what_no_sweep_goes_over(over: Any, more: dict[str, Any], words: str) ->
 @pytest.mark.parametrize(
     ("over", "words"),
     [
-        (["drive.offset"], "must give each key its range"),
+        (["drive.offset"], "tune: over = ['drive.offset'] must be a mapping or None."),
         ({1: (0, 1)}, "--over 1: there is no such key"),
         *(
             ({"drive.offset": ends}, "must be LOW and HIGH, LOW below HIGH, each a number")
@@ -177,6 +179,34 @@ def test_what_no_search_goes_over(over: Any, words: str) -> None:
     with pytest.raises(cosim.BadInput) as caught:
         cosim.tune("held", SHORT, maximise="v_average", over=over)
     assert words in str(caught.value) and len(str(caught.value)) < 500
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: cosim.theory(mu_s="a"), 'theory: mu_s = "a" must be a number.'),
+        (lambda: cosim.theory(mu_k=np.ones(2)), "theory: mu_k = [1. 1.] must be a number."),
+        (lambda: cosim.limits(effort="1"), 'limits: effort = "1" must be a number.'),
+        (lambda: cosim.limits(overrides=5), "overrides: must be a mapping or a list of strings"),
+        (lambda: cosim.limits(quick="no"), 'limits: quick = "no" must be True or False.'),
+        (lambda: cosim.run("held", np.ones(2)), "must be a mapping or a list of strings"),
+        (lambda: cosim.run("held", progress=None), "run: progress = None must be a function."),
+        (lambda: cosim.compare("held", None), "compare: trial = None must be a text or a path."),
+        (lambda: cosim.spread(5), "must be a scene, or the name of one"),
+        (lambda: cosim.tune("held", waveform=5), "waveform = 5 must be a text or a list of texts."),
+        (lambda: cosim.tune("held", waveform=[1]), "waveform = [1] must be a text or a list of te"),
+        (lambda: cosim.identify("x", apart="5"), 'apart = "5" must be a list of texts.'),
+        (lambda: cosim.fit("x", mu_k="low"), 'mu_k = "low" must be a number or "free".'),
+        (lambda: cosim.ladder([]), "ladder: scenes must name a scene at least."),
+        (lambda: cosim.theory().save(None), "Theory.save: folder = None must be a text or a path."),
+        (lambda: cosim.bench(quick=None), "bench: quick = None must be True or False."),
+    ],
+    ids=range(16),
+)
+def test_a_wrong_type_is_told_in_one_sentence(call: Callable[[], Any], words: str) -> None:
+    with pytest.raises(cosim.BadInput) as caught:
+        call()
+    assert words in str(caught.value) and "\n" not in str(caught.value)
 
 
 def test_names_of_a_sweep() -> None:

@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from itertools import islice
 from math import inf
+from operator import methodcaller
 from pathlib import Path
 from time import monotonic
 from typing import Any, Protocol, TypeVar
@@ -195,8 +196,9 @@ class Store:
 
 
 def hashed(*said: Any) -> str:
-    """A hash of what JSON can hold."""
-    return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
+    """A hash of what JSON can hold, and of NumPy's numbers."""
+    words = json.dumps(said, sort_keys=True, default=methodcaller("item"))
+    return hashlib.sha256(words.encode()).hexdigest()
 
 
 def _files(path: Path) -> list[Path]:

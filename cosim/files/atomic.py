@@ -6,6 +6,7 @@ import stat
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from operator import methodcaller
 from pathlib import Path
 from shutil import rmtree
 from tempfile import mkdtemp
@@ -176,4 +177,7 @@ def write_json(path: Path, content: Any) -> None:
 
 def as_json(content: Any) -> str:
     """What :func:`write_json` writes."""
-    return json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    numbers = methodcaller("item")  # NumPy's
+    return (
+        json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False, default=numbers) + "\n"
+    )

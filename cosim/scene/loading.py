@@ -84,7 +84,8 @@ def load(source: "Scene | str | os.PathLike[str]", overrides: Overrides | None =
         if not isinstance(source, str | bytes | os.PathLike):
             raise BadInput(f"{messages.shown(source)}: must be a scene, or the name of one.")
         layers = _layers(os.fsdecode(source))
-    if isinstance(overrides, str | bytes) or not isinstance(overrides or (), Iterable):
+    odd = isinstance(overrides, str | bytes) or hasattr(overrides, "ndim")  # an array of NumPy
+    if odd or not isinstance(overrides or (), Iterable):
         given = messages.shown(overrides)
         raise BadInput(f"overrides: must be a mapping or a list of strings, not {given}.")
     base = layers[-1].origin

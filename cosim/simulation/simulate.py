@@ -12,9 +12,11 @@ from cosim.errors import BadInput, BeyondModel
 from cosim.scene import Overrides, Scene, changed, load
 from cosim.simulation.elsewhere import one_run
 from cosim.toolchain.processes import Progress
+from cosim.typed import typed
 from cosim.waveforms.result import Result
 
 
+@typed
 def run(
     scene: Scene | str | os.PathLike[str],
     overrides: Overrides | None = None,

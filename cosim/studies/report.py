@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from cosim.files.atomic import whole, write_text
 from cosim.toolchain.versions import versions
+from cosim.typed import typed
 
 if TYPE_CHECKING:
     from cosim.files.picture import Picture
@@ -53,6 +54,7 @@ class Report:
     printed: str = ""
     """The text for the terminal; by default the first sentence."""
 
+    @typed
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Write the rows as CSV, a page of Markdown and the figures. Raises BadInput where the
         folder cannot be written to."""

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from cosim.arrays import Array
 from cosim.files.atomic import as_json, together
 from cosim.scene import Scene, to_toml
+from cosim.typed import typed
 from cosim.waveforms import identity
 from cosim.waveforms.columns import UNITS, about
 from cosim.waveforms.report import table
@@ -57,6 +58,7 @@ class Result:
             return figure.draw_own(self.scene, self.columns, self.units)
         return figure.draw(self.scene, self.columns, self.summary)
 
+    @typed
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Write what ``cosim run`` writes: ``waveforms.csv``, ``waveforms.nc``, ``scene.toml``,
         ``summary.json`` and ``figure.png``, each whole or not at all.

@@ -31,6 +31,7 @@ from cosim.studies.plots import (
     panels,
 )
 from cosim.studies.report import Progress, Report, Row, brief, silent, span
+from cosim.typed import typed
 
 EQUAL_TIME, EQUAL_ERROR = 0.5, 1e-3
 """CPU seconds, and error over range, at which methods are compared."""
@@ -152,6 +153,7 @@ class Comparison:
         }
 
 
+@typed
 def accuracy(
     *,
     quick: bool = False,

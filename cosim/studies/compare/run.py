@@ -20,6 +20,7 @@ from cosim.studies.compare.scores import LINES, Number
 from cosim.studies.report import Row, markdown
 from cosim.studies.report import write_csv as write_rows
 from cosim.trials.recording import Recording, read_recording
+from cosim.typed import typed
 from cosim.waveforms import formats
 from cosim.waveforms.columns import UNITS
 from cosim.waveforms.formats.tracker import laid_over
@@ -46,6 +47,7 @@ class Comparison:
         """Every measured signal and the simulated one, over time."""
         return figure.draw(f"{self.run} against {self.trial}", self.found)
 
+    @typed
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Write ``compare.json``, ``compare.csv``, ``frames.csv`` and ``compare.png``."""
         out = Path(folder)
@@ -102,6 +104,7 @@ def _table(numbers: dict[str, Number], ends: Mapping[str, str]) -> list[str]:
     return [*markdown(rows), "", *meanings] if rows else []
 
 
+@typed
 def compare(
     run: Result | Scene | str | os.PathLike[str],
     trial: str | os.PathLike[str],
@@ -124,7 +127,7 @@ def compare(
     ``numbers`` of what comes back are the scores by name, SI but for ``_mm`` and ``_percent``.
     Raises BadInput for files that cannot be read, and for a run that is too short.
     """
-    if not isinstance(run, Result | Scene) and Path(run).suffix.lower() == ".csv":
+    if isinstance(run, str | os.PathLike) and Path(run).suffix.lower() == ".csv":
         raise BadInput(
             f"{plain(run)}: a table is no run; the run's folder or the scene comes first, the "
             "trial second."
@@ -140,10 +143,9 @@ def _run(
     run: Result | Scene | str | os.PathLike[str], overrides: Overrides | None, trial: Recording
 ) -> tuple[str, dict[str, Array], Scene]:
     """The run's name, its waveforms and its scene."""
-    name = str(run)
-    if isinstance(run, Result | Scene):
-        name = run.name if isinstance(run, Scene) else run.scene.name
-    if isinstance(run, Result) or (not isinstance(run, Scene) and Path(run).is_dir()):
+    named = run.scene if isinstance(run, Result) else run
+    name = named.name if isinstance(named, Scene) else str(named)
+    if isinstance(run, Result) or (isinstance(run, str | os.PathLike) and Path(run).is_dir()):
         if overrides:
             raise BadInput(f"--set cannot change {plain(name)}, which is a finished run.")
         if isinstance(run, Result):

@@ -25,6 +25,7 @@ from cosim.studies.fit.slides import Slide, noise_of
 from cosim.studies.report import Row, write_csv
 from cosim.trials import published
 from cosim.trials.tracked import Trial, read_folder
+from cosim.typed import typed
 
 Solver = Literal["exact", "published"]
 
@@ -48,6 +49,7 @@ class TrialResults:
         """Measured and predicted heights of the part, a panel for each trial."""
         return figures.trials(self.shown, self.numbers)
 
+    @typed
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Write ``fit.json``, ``fit.csv`` and the figures ``fit-*.png``."""
         out = Path(folder)
@@ -66,6 +68,7 @@ LEAST_MU_K = 1e-3
 """Below any dry pair of surfaces; a smaller µ_k would give absurd normal forces, µ_k F_n/µ_k."""
 
 
+@typed
 def fit(
     trials: str | os.PathLike[str],
     *,

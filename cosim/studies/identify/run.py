@@ -22,6 +22,7 @@ from cosim.studies.identify.search.plan import FULL, QUICK, Plan, folds, searche
 from cosim.studies.identify.search.search import Found, Progress, Search, best_of, deviations
 from cosim.studies.report import Row
 from cosim.studies.study import check_seed
+from cosim.typed import typed
 
 UNSTEADY = 0.5
 """Scatter of a velocity's cycles (NRMSE) above which no periodic drive can explain the trial."""
@@ -34,6 +35,7 @@ class Identification(solved.Solved):
         """Every trial: surface and part, measured and simulated."""
         return figures.overlays(self)
 
+    @typed
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Write ``identify.json``, ``.csv``, ``.md``, the figures ``identify-*.png``, the rig's
         scene ``rig.toml`` and one for each trial."""
@@ -43,6 +45,7 @@ class Identification(solved.Solved):
         return files.summary(self)
 
 
+@typed
 def identify(
     trials: str | os.PathLike[str],
     *,

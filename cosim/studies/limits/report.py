@@ -19,6 +19,7 @@ from cosim.studies.limits.runs import GOALS, NEEDED, Goal, command
 from cosim.studies.limits.study import FULL, QUICK, Study, checked, ensemble, steps, study
 from cosim.studies.report import Progress, Report, Row, counted, silent
 from cosim.studies.study import check_seed
+from cosim.typed import typed
 
 STORE = "limits.sqlite"
 
@@ -96,6 +97,7 @@ def _gains(found: Study, goal: Goal) -> Iterator[Row]:
         }
 
 
+@typed
 def limits(
     scene: Scene | str | os.PathLike[str] = "paper",
     overrides: Overrides | None = None,
@@ -126,11 +128,11 @@ def limits(
     if not LEAST_EFFORT <= effort <= MOST_EFFORT:
         raise BadInput(f"--effort {effort:g}: must be from {LEAST_EFFORT:g} to {MOST_EFFORT:g}.")
     words = [scene.name if isinstance(scene, Scene) else str(scene)]
+    base = load(scene, overrides)
     if overrides:
         pairs = overrides.items() if isinstance(overrides, Mapping) else ()
         texts = [f"{key}={value}" for key, value in pairs] or list(overrides)
         words += [f"--set {text}" for text in texts]
-    base = load(scene, overrides)
     efforts = (QUICK if quick else FULL).times(effort)
     checked(base)
     others: list[Settings] = ensemble(Path(rigs), base) if rigs is not None else []

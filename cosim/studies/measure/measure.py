@@ -30,6 +30,7 @@ from cosim.studies.measure.worth import FEWEST, Worth, chance, worth
 from cosim.studies.plots import BLUE, ORANGE, panels
 from cosim.studies.report import Progress, Report, Row, brief, counted, silent
 from cosim.studies.study import check_seed
+from cosim.typed import typed
 from cosim.waveforms.quantities import percent, signed
 
 RIGS, QUICK, LEAST = 48, 24, 4
@@ -40,6 +41,7 @@ NOTHING, USELESS = "nothing", "chance"
 """Names of two rows: no measurement, and a measurement that does not depend on the targets."""
 
 
+@typed
 def measure(
     scene: Scene | str | os.PathLike[str] = "paper",
     overrides: Overrides | None = None,

@@ -16,6 +16,7 @@ from cosim.drive.surface.waveforms import (
 )
 from cosim.errors import BadInput
 from cosim.files.atomic import write_json
+from cosim.typed import typed
 
 if TYPE_CHECKING:
     from cosim.files.picture import Picture
@@ -40,6 +41,7 @@ class Theory:
 
         return figures.draw_cycle(self.case)
 
+    @typed
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Write ``theory.json``, the paper's figures 3 and 4, and the transport near the optimum,
         ``knife_edge.csv`` and ``knife_edge.png``."""
@@ -69,6 +71,7 @@ class Theory:
         return "\n".join(f"  {name:<25}{value}" for name, value in rows.items())
 
 
+@typed
 def theory(
     *,
     mu_s: float = FIGURE_3.mu_s,

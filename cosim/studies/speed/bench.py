@@ -23,6 +23,7 @@ from cosim.simulation.simulate import simulate
 from cosim.studies.report import Row, machine, markdown
 from cosim.toolchain.libraries import compiled
 from cosim.toolchain.processes import in_place
+from cosim.typed import typed
 
 BRIEF_FULL = ("circuit.model=full", "run.duration=0.1", "run.settle=0.05")
 """Settings that shorten the scene `reference` for the rung `full`, which is thirty times slower."""
@@ -52,6 +53,7 @@ class Bench:
 
     numbers: dict[str, Any]
 
+    @typed
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Write ``bench.json``."""
         write_json(Path(folder) / "bench.json", self.numbers)
@@ -60,6 +62,7 @@ class Bench:
         return table(self.numbers, TITLES)
 
 
+@typed
 def bench(*, quick: bool = False) -> Bench:
     """Speed ratios of this machine, each with its target.
 

@@ -9,7 +9,7 @@ from math import ceil, nan
 from statistics import median
 from typing import Any
 
-from cosim.errors import SimulationFailed
+from cosim.errors import BadInput, SimulationFailed
 from cosim.evaluate.point import in_whole_periods
 from cosim.evaluate.store import Store, hashed, reported
 from cosim.files.picture import Picture
@@ -18,6 +18,7 @@ from cosim.simulation.fidelity import relative_error
 from cosim.simulation.simulate import simulate
 from cosim.studies.plots import GREEN, panels
 from cosim.studies.report import Progress, Report, brief, counted, markdown, silent
+from cosim.typed import typed
 
 RUNGS = ("ideal", "limited", "amplifier", "full")
 """Cheapest first; only "full" has the data sheet's output stage and the firmware's staircase."""
@@ -113,6 +114,7 @@ Found = Sequence[tuple[Scene, list[Rung]]]
 """Scenes with their rungs."""
 
 
+@typed
 def ladder(
     scenes: Sequence[Scene | str | os.PathLike[str]] = ("paper",),
     overrides: Overrides | None = None,
@@ -127,6 +129,8 @@ def ladder(
     study has left there. Raises BadInput and SimulationFailed.
     """
     loaded = [load(scene, overrides) for scene in scenes]
+    if not loaded:
+        raise BadInput("ladder: scenes must name a scene at least.")
     tick = counted(progress, len(RUNS) * len(loaded))
     return reported(
         lambda store: report([(scene, each_rung(scene, store, tick)) for scene in loaded]),

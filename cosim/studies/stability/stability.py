@@ -26,6 +26,7 @@ from cosim.files.picture import Picture
 from cosim.scene import Scene, changed, load
 from cosim.studies.plots import BLUE, GREEN, ORANGE, VERMILION, panels
 from cosim.studies.report import Progress, Report, Row, silent, span
+from cosim.typed import typed
 from cosim.waveforms.quantities import percent
 
 Output = Literal["saturated", "regulated"]
@@ -253,6 +254,7 @@ def limits(regimes: Sequence[Regime], store: Store) -> Iterator[Limit]:
             yield Limit(*given, method, *store.once(f"{method}, {given}", both))
 
 
+@typed
 def stability(
     *,
     quick: bool = False,

@@ -68,7 +68,7 @@ class Design:
 
 def grid(over: Mapping[str, Sequence[Number]]) -> Design:
     """Every combination of the values of each ``table.key``. Raises BadInput."""
-    if not isinstance(over, Mapping) or not over:
+    if not over:
         form = "--over drive.frequency=10:60:26"
         raise BadInput(f"--over: a sweep needs at least one key and its values, such as {form}.")
     _check_count(over)

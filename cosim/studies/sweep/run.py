@@ -25,6 +25,7 @@ from cosim.studies.sweep.design import Design, grid, sample
 from cosim.studies.sweep.report import MOTION, MOTIONS, fastest
 from cosim.toolchain.processes import Progress
 from cosim.toolchain.versions import versions
+from cosim.typed import typed
 from cosim.waveforms.report import motion_in_words, of_the_start
 from cosim.waveforms.storage import netcdf
 
@@ -45,6 +46,7 @@ of one writing."""
 _RARELY = 20.0
 
 
+@typed
 def sweep(
     scene: Scene | str | os.PathLike[str],
     over: Mapping[str, Sequence[Number]],

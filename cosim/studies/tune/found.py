@@ -20,6 +20,7 @@ from cosim.scene.tables import COMMANDS, KNOBS
 from cosim.search.turns import TURN
 from cosim.studies.plots import headline
 from cosim.studies.report import write_csv
+from cosim.typed import typed
 from cosim.waveforms.quantities import bench_unit, label, meaning, percent, with_unit
 from cosim.waveforms.report import motion_in_words
 
@@ -180,6 +181,7 @@ class Tuning:
         )
         return figure
 
+    @typed
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Write ``tune.json``, ``tune.csv``, ``best.toml`` and ``figure.png``; of each other
         waveform ``best-WAVEFORM.toml``."""

@@ -27,6 +27,7 @@ from cosim.simulation.checks import motion
 from cosim.simulation.fidelity import Fidelity
 from cosim.studies.study import check_seed
 from cosim.studies.tune.found import Run, Tuning, write_runs
+from cosim.typed import typed
 
 KNOBS: dict[str, tuple[float, float]] = {
     f"drive.{knob}": (0.0, 1.0) for knob in ("pot_max", "pot_frequency", "pot_offset")
@@ -58,6 +59,7 @@ FINE = 10**9
 """Steps to which a key's range is rounded: points that round alike are run once."""
 
 
+@typed
 def tune(
     scene: Scene | str | os.PathLike[str],
     overrides: Overrides | None = None,
@@ -217,8 +219,6 @@ def most_heat(scene: Scene, limit: float | str | None) -> float:
 
 
 def _checked(over: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
-    if not isinstance(over, Mapping):
-        raise BadInput(f"--over {shown(over)}: must give each key its range.")
     for name, ends in over.items():
         key = numeric_key(str(name))
         try:

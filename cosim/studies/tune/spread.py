@@ -12,6 +12,7 @@ from cosim.scene import KEYS, Overrides, Scene, load
 from cosim.scene.tables import KNOBS
 from cosim.search.turns import TURN
 from cosim.simulation.fidelity import Fidelity
+from cosim.typed import typed
 from cosim.waveforms.quantities import with_unit
 
 Settings = dict[str, float]
@@ -79,6 +80,7 @@ class Spread:
         return "\n".join(f"  {name:<24}{value}" for name, value in rows)
 
 
+@typed
 def spread(
     scene: Scene | str | os.PathLike[str],
     overrides: Overrides | None = None,
