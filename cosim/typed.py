@@ -6,13 +6,13 @@ from functools import wraps
 from inspect import signature
 from numbers import Real
 from types import NoneType, UnionType
-from typing import Any, Literal, ParamSpec, TypeVar, Union, get_args, get_origin
+from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin
 
 import numpy as np
 
 from cosim.errors import BadInput
 
-_P, _R = ParamSpec("_P"), TypeVar("_R")
+_F = TypeVar("_F", bound=Callable[..., Any])
 
 _NO_LIST = str, bytes, np.ndarray
 _KINDS: dict[Any, tuple[str, Callable[[Any], bool]]] = {
@@ -28,13 +28,13 @@ _KINDS: dict[Any, tuple[str, Callable[[Any], bool]]] = {
 """Words for types, and whether a value is of them."""
 
 
-def typed(function: Callable[_P, _R]) -> Callable[_P, _R]:
+def typed(function: _F) -> _F:
     """The function, which refuses arguments of other types than it declares by BadInput. Scenes and
     whole numbers, whose range tells more, are left to the function itself."""
     declared = signature(function)
 
     @wraps(function)
-    def called(*given: _P.args, **named: _P.kwargs) -> _R:
+    def called(*given: Any, **named: Any) -> Any:
         for name, value in declared.bind(*given, **named).arguments.items():
             kinds = _kinds(declared.parameters[name].annotation)
             if kinds and not any(_is(value, kind) for kind in kinds):
@@ -44,7 +44,7 @@ def typed(function: Callable[_P, _R]) -> Callable[_P, _R]:
                 raise BadInput(f"{function.__qualname__}: {words}.")
         return function(*given, **named)
 
-    return called
+    return cast(_F, called)
 
 
 def _kinds(declared: Any) -> tuple[Any, ...]:

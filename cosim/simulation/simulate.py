@@ -29,6 +29,8 @@ def run(
     simulated time, s, now and then. Circuits run in worker processes, as many at once as there are
     processors; any thread may call this.
 
+    What comes back has the curves as ``waveforms``, and the numbers of ``summary.json``, SI, as the
+    dictionary ``summary``: the page "Summary" of the reference has them all.
     ``summary["v_average_error"]`` and ``summary["motion"]`` tell how far its numbers hold; what
     they are from is in :mod:`cosim.simulation.checks`. With ``strict`` they come from more and
     finer runs, which takes about ten times as long.

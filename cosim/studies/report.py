@@ -38,7 +38,8 @@ def silent(done: int, total: int, what: str = "") -> None:
 
 @dataclass(frozen=True, repr=False)
 class Report:
-    """The results of a study; its ``repr`` is a text for the terminal."""
+    """The results of a study; its ``repr`` is a text for the terminal. What its ``rows`` hold is
+    told by the function that gives it, such as :func:`cosim.ladder`."""
 
     name: str
     """Name of its files, without an ending."""

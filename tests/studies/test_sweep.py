@@ -389,8 +389,13 @@ def test_a_sweep_of_ones_own_circuit_over_two_keys_is_a_map_and_a_range() -> Non
     assert np.nan_to_num(colours.astype(float)).tolist() == np.nan_to_num(speed).tolist()
 
 
-@pytest.mark.parametrize(("least", "told"), [(-1e-3, True), (0.0, True), (1e-4, False)])
-def test_a_map_tells_what_its_black_lines_are(least: float, told: bool) -> None:
+@pytest.mark.parametrize(
+    ("least", "told", "stays"),
+    [(-1e-3, True, False), (0.0, True, True), (1e-4, False, False), (4e-5, True, True)],
+)
+def test_a_map_tells_what_its_black_lines_and_dashes_are(
+    least: float, told: bool, stays: bool
+) -> None:
     keys = {"a": [1.0, 2.0], "b": [1.0, 2.0]}
     data = xr.Dataset(
         {
@@ -402,6 +407,7 @@ def test_a_map_tells_what_its_black_lines_are(least: float, told: bool) -> None:
     )
     drawn = figure.draw(data, "map")
     assert ("black lines: ±0.05 mm/s" in drawn.get_suptitle()) == told
+    assert ("dashes: the part stays" in drawn.get_suptitle()) == stays
     assert (len(drawn.axes[0].collections) > 1) == told
 
 

@@ -116,6 +116,16 @@ def test_bad_input(
     assert words in said and said.count("\n") == 1 and not out.exists()
 
 
+def test_a_number_of_the_machine_is_refused_where_there_is_none(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Before anything runs."""
+    monkeypatch.setattr(Evaluator, "_run", lambda *_: pytest.fail("it ran"))
+    over = {"circuit.param.r": (1.0, 2.0)}
+    with pytest.raises(BadInput, match=r"^scene relay: v_average is not .* has NAME\.mean, "):
+        tune("relay", maximise="v_average", over=over)
+
+
 @pytest.mark.parametrize(
     "given", [{"budget": 26.5}, {"budget": 30.0}, {"budget": "30"}, {"workers": 1.5}]
 )

@@ -164,6 +164,11 @@ def accuracy(
     """The error of every coupling method over its run time; ``quick``: on one scene; ``more``:
     other solvers that are to be lines besides.
 
+    Each of the report's ``rows`` is a run: ``scene``, ``method``, ``setting`` (name and unit of
+    what is varied), its ``value``, ``error`` (of the part's height, as a share of its range; nan
+    where the run failed), ``seconds`` of CPU time, ``steps`` of the circuit and ``failure``.
+    ``tables`` compare the methods at equal time and error, and tell each one's order.
+
     In the folder ``out`` it leaves what ``Report.save`` writes, and takes up what an
     interrupted study has left there. Raises BadInput.
     """

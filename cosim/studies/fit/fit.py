@@ -87,6 +87,10 @@ def fit(
 
     ``evaluate="published"`` takes the paper's µ_k and forces instead, by the authors' procedure,
     with the exact solution or with their scheme (``solver``). Raises BadInput.
+
+    ``numbers`` of what comes back is what ``fit.json`` holds: ``trials``, a dictionary each, with
+    ``normal_force_weights`` and what was measured of it, ``mean_error_mm`` and others whose names
+    have their units, means of these over the trials, and the coefficients of friction.
     """
     folder = Path(trials)
     if evaluate not in (None, "published"):

@@ -66,6 +66,9 @@ def identify(
     result, on any number of ``workers`` (threads; one for each processor by default). ``progress``
     is told what is done and the best cost so far.
 
+    ``numbers`` of what comes back is what ``identify.json`` holds: ``rig``, keys and values, SI,
+    ``verdicts`` on how well each key is known, ``trials`` with errors and their own drives,
+    ``ensemble``, the rigs that may be meant, and checks by ``held_out`` trials and ``made_up_rig``.
     The method: :mod:`cosim.studies.identify.search.plan`. Raises BadInput.
     """
     check_seed(seed)

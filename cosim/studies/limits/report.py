@@ -121,6 +121,13 @@ def limits(
     what the searches may cost. The same for the same ``seed``, on any number of ``workers`` or on
     the Dask cluster at the address ``dask``.
 
+    Each of the report's ``rows`` is the best setting of a ``rig`` (0: the scene's) after a
+    ``change``, for a ``goal`` and ``kind`` ("best" or "robust"): ``value``, ``median over turns``
+    and ``worst over turns`` in ``unit``, ``v_average [mm/s]``, the surface's ``a_camera [m/s²]``,
+    ``heat of a coil [W]``, the drive's ``drive.frequency [Hz]``, ``drive.amplitude [V]`` and
+    ``drive.offset [V]``, the rung ``judged on``, what it found ``there``, whether that
+    ``confirmed`` it, and the ``command`` that repeats it. ``tables`` have the gains, by goal.
+
     In the folder ``out`` it leaves what ``Report.save`` writes, and takes up what an interrupted
     study has left there. Raises BadInput.
     """

@@ -61,6 +61,12 @@ def measure(
     others are weighted by how well they agree with what it would show, noise added. ``quick`` draws
     few. The same for the same ``seed``.
 
+    Each of the report's ``rows`` is a ``measurement``, the most telling first, behind "nothing"
+    and "chance", one that has nothing to do with it: its ``accuracy``, its range over ``90 % of the
+    rigs``, and for each target, "as it is" and "falling sawtooth", ``TARGET: width [mm/s]`` of the
+    90 % interval that is left, its standard error ``TARGET: ± [mm/s]``, ``TARGET: left [%]`` of the
+    present width, and how often the truth lies within, ``TARGET: holds [%]``; ``how`` to measure.
+
     In the folder ``out`` it leaves what ``Report.save`` writes, and takes up what an interrupted
     study has left there. Raises BadInput.
     """

@@ -83,8 +83,13 @@ def theory(
     """The closed forms of vertical vibratory transport (Yako et al., ICRA 2024, corrected).
 
     Coefficients of friction, the surface's largest acceleration in m/s², the normal force over the
-    part's weight, and the period in s; by default those of the paper's figure 3. ``numbers`` of
-    what comes back are SI. Raises BadInput where there is no transport upwards.
+    part's weight, and the period in s; by default those of the paper's figure 3. Raises BadInput
+    where there is no transport upwards.
+
+    ``numbers`` of what comes back, as ``theory.json`` has them, SI: the ``inputs``, the
+    ``conditions`` of transport, ``horizontal_equivalent``, the optimal cycles ``up``, ``down``,
+    their robust variants and Quaid's (``v_average`` in m/s, and over g T), the best and the largest
+    ``normal_force`` over the part's weight, and ``figure4``, a row for each acceleration.
 
     >>> round(theory(period=0.05).numbers["up"]["v_average"], 4)
     0.1524

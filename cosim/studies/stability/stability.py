@@ -264,6 +264,11 @@ def stability(
     """The largest stable macro step of every coupling method, predicted and observed; ``quick``: of
     few machines.
 
+    Each of the report's ``rows`` is a method in a regime: ``machine``, ``strength [1/s]`` of the
+    coupling, Bl²/(m R), ``output`` (regulated or saturated), ``part``, ``cut`` (on whose side the
+    coil is), ``method``, ``predicted [s]`` and ``observed [s]``. ``tables`` have the predicted
+    limits in ms, by cut.
+
     In the folder ``out`` it leaves what ``Report.save`` writes, and takes up what an interrupted
     study has left there. Raises BadInput.
     """

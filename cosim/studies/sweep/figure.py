@@ -64,8 +64,9 @@ def draw(data: xr.Dataset, title: str) -> Picture:
         if fixed:
             words += f"; drawn at {', '.join(_setting(shown[key]) for key in fixed)}, the best"
         v, most = _values(shown, V_AVERAGE), STAYS * V_AVERAGE.scale
-        if (v < most).any() and (v > -most).any():
-            words += f"; black lines: ±{most:g} mm/s; dashes: the part stays"
+        if any((v < level).any() and (v > level).any() for level in (-most, most)):
+            words += f"; black lines: ±{most:g} mm/s"
+        words += "; dashes: the part stays" * bool((abs(v) < most).any())
     if of_ports(data):
         said = range_of(data, quantities[0].name, 4) or "all failed"
         headline(figure, f"{title}: {quantities[0].name} {said}\n{words}".replace("$", "\\$"))

@@ -68,7 +68,10 @@ def sweep(
     or independent points if ``random``, the same for the same ``seed``.
 
     The dataset has a dimension for each key, named without its table (``ds.sel(amplitude=8)``), or
-    the dimension ``point`` for samples. A point that fails is NaN, with the reason in ``failure``.
+    the dimension ``point`` for samples. Its variables are the numbers of a run's ``summary`` under
+    their names, SI, each with ``units`` and ``long_name``; of a sweep by the fast solver also
+    ``v_average_fmu``, where the FMU ran a point again. Attributes tell the scene, and the kind of
+    motion at the fastest points. A point that fails is NaN, with the reason in ``failure``.
     Where the frequency is swept, each point's settling and averages last whole periods, at least as
     long as the scene's own.
 

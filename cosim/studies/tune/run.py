@@ -28,6 +28,7 @@ from cosim.simulation.fidelity import Fidelity
 from cosim.studies.study import check_seed
 from cosim.studies.tune.found import Run, Tuning, write_runs
 from cosim.typed import typed
+from cosim.waveforms.quantities import SUMMARY, UNITLESS
 
 KNOBS: dict[str, tuple[float, float]] = {
     f"drive.{knob}": (0.0, 1.0) for knob in ("pot_max", "pot_frequency", "pot_offset")
@@ -109,6 +110,9 @@ def tune(
         words = "must name a number of the summary, such as v_average"
         raise BadInput(f"tune: either maximise or minimise {words}.")
     scene = load(scene, overrides)
+    if scene.has_ports and quantity in SUMMARY and SUMMARY[quantity].unit not in UNITLESS:
+        words = "as a scene with ports has NAME.mean, .rms, .least and .greatest of each signal"
+        raise scene.bad(f"{quantity} is not a number of its summary, {words}.")
     check_seed(seed)
     shaped = waveform or scene.drive.waveform in COMMANDS
     if not over and not (shaped and scene.rung.driven):

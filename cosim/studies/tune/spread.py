@@ -96,6 +96,9 @@ def spread(
     differs by more than ``run.tolerance``, all others too. ``workers`` runs at once, by default one
     for each processor; ``progress`` is given the number of runs done.
 
+    Of what comes back ``runs`` has each setting's keys and ``v_average``, m/s; ``least`` and
+    ``most`` are two of them, and ``summary()`` is what ``summary.json`` gets.
+
     Raises BadInput for a scene without knobs, SimulationFailed where every run failed.
 
     >>> found = spread("ideal-current", {"run.duration": 0.1})

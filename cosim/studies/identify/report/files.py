@@ -77,8 +77,8 @@ def write(folder: Path, found: Solved) -> None:
         told = f"Trial {trial.label} on the identified rig; its record begins at {first:.4g} s"
         if trial in found.apart:
             told = f"Trial {trial.label} on the identified rig, which does not reproduce it"
-        label = f"{int(trial.label):02d}" if trial.label.isdecimal() else trial.label
-        write_text(folder / f"trial-{label}.toml", scene_file(told, rig | settings))
+        number = f"{int(trial.label):02d}" if trial.label.isdecimal() else trial.label
+        write_text(folder / f"trial-{number}.toml", scene_file(told, rig | settings))
 
 
 def _priors(found: Solved) -> list[str]:
