@@ -5,7 +5,6 @@ import os
 import subprocess
 import sys
 from base64 import b64decode
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -182,31 +181,36 @@ def test_what_no_search_goes_over(over: Any, words: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("call", "words"),
+    ("name", "given", "words"),
     [
-        (lambda: cosim.theory(mu_s="a"), 'theory: mu_s = "a" must be a number.'),
-        (lambda: cosim.theory(mu_k=np.ones(2)), "theory: mu_k = [1. 1.] must be a number."),
-        (lambda: cosim.limits(effort="1"), 'limits: effort = "1" must be a number.'),
-        (lambda: cosim.limits(overrides=5), "overrides: must be a mapping or a list of strings"),
-        (lambda: cosim.limits(quick="no"), 'limits: quick = "no" must be True or False.'),
-        (lambda: cosim.run("held", np.ones(2)), "must be a mapping or a list of strings"),
-        (lambda: cosim.run("held", progress=None), "run: progress = None must be a function."),
-        (lambda: cosim.compare("held", None), "compare: trial = None must be a text or a path."),
-        (lambda: cosim.spread(5), "must be a scene, or the name of one"),
-        (lambda: cosim.tune("held", waveform=5), "waveform = 5 must be a text or a list of texts."),
-        (lambda: cosim.tune("held", waveform=[1]), "waveform = [1] must be a text or a list of te"),
-        (lambda: cosim.identify("x", apart="5"), 'apart = "5" must be a list of texts.'),
-        (lambda: cosim.fit("x", mu_k="low"), 'mu_k = "low" must be a number or "free".'),
-        (lambda: cosim.ladder([]), "ladder: scenes must name a scene at least."),
-        (lambda: cosim.theory().save(None), "Theory.save: folder = None must be a text or a path."),
-        (lambda: cosim.bench(quick=None), "bench: quick = None must be True or False."),
+        ("theory", {"mu_s": "a"}, 'theory: mu_s = "a" must be a number.'),
+        ("theory", {"mu_k": np.ones(2)}, "theory: mu_k = [1. 1.] must be a number."),
+        ("limits", {"effort": "1"}, 'limits: effort = "1" must be a number.'),
+        ("limits", {"overrides": 5}, "overrides: must be a mapping or a list of strings"),
+        ("limits", {"quick": "no"}, 'limits: quick = "no" must be True or False.'),
+        ("run", {"scene": "held", "overrides": np.ones(2)}, "must be a mapping or a list of"),
+        ("run", {"scene": "held", "progress": None}, "run: progress = None must be a function."),
+        ("compare", {"run": "held", "trial": None}, "trial = None must be a text or a path."),
+        ("spread", {"scene": 5}, "must be a scene, or the name of one"),
+        ("tune", {"scene": "held", "waveform": 5}, "5 must be a text or a list of texts."),
+        ("tune", {"scene": "held", "waveform": [1]}, "[1] must be a text or a list of texts."),
+        ("identify", {"trials": "x", "apart": "5"}, 'apart = "5" must be a list of texts.'),
+        ("fit", {"trials": "x", "mu_k": "low"}, 'mu_k = "low" must be a number or "free".'),
+        ("ladder", {"scenes": []}, "ladder: scenes must name a scene at least."),
+        ("bench", {"quick": None}, "bench: quick = None must be True or False."),
     ],
-    ids=range(16),
+    ids=range(15),
 )
-def test_a_wrong_type_is_told_in_one_sentence(call: Callable[[], Any], words: str) -> None:
+def test_a_wrong_type_is_told_in_one_sentence(name: str, given: dict[str, Any], words: str) -> None:
     with pytest.raises(cosim.BadInput) as caught:
-        call()
+        getattr(cosim, name)(**given)
     assert words in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_folder_that_is_none() -> None:
+    made: Any = cosim.theory()
+    with pytest.raises(cosim.BadInput, match=r"Theory\.save: folder = None must be a text or"):
+        made.save(None)
 
 
 def test_names_of_a_sweep() -> None:

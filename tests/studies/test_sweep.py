@@ -301,6 +301,7 @@ BAD = [
     (["--over", "drive.offset=1", "--samples", "5"], "needs a range"),
     (["--over", "drive.offset=1,2", "--random"], "--random needs --samples"),
     (["--over", "drive.offset=1,2", "--workers", "0"], "--workers 0"),
+    (["--over", "drive.offset=1,2", "--keep", "v_prt"], '"v_prt"; did you mean v_part'),
     (["--over", "drive.offset=0:1:9999", "--over", "drive.amplitude=0:1:9999"], "points"),
 ]  # fmt: skip
 

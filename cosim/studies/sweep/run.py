@@ -19,6 +19,7 @@ from cosim.evaluate.point import Number, Settings, in_whole_periods
 from cosim.files.atomic import whole
 from cosim.mechanics import package as fmu
 from cosim.scene import Overrides, Scene, changed, load
+from cosim.scene.messages import suggestion
 from cosim.simulation.checks import motion
 from cosim.studies.sweep import dataset
 from cosim.studies.sweep.design import Design, grid, sample
@@ -26,6 +27,7 @@ from cosim.studies.sweep.report import MOTION, MOTIONS, fastest
 from cosim.toolchain.processes import Progress
 from cosim.toolchain.versions import versions
 from cosim.typed import typed
+from cosim.waveforms.columns import UNITS
 from cosim.waveforms.report import motion_in_words, of_the_start
 from cosim.waveforms.storage import netcdf
 
@@ -93,8 +95,11 @@ def sweep(
     refuse_unknown(scene, over)
     if keep and out is None:
         raise BadInput("keep: waveforms are kept in a folder; name one as out.")
+    kept = [keep] if isinstance(keep, str) else keep
+    known = {*UNITS, *(scene.circuit.save or ())}
+    if not scene.port and (unknown := [name for name in kept if name not in known]):
+        raise BadInput(f'--keep: no run has "{plain(unknown[0])}"{suggestion(unknown[0], known)}.')
     with TemporaryDirectory() if out is None else nullcontext(out) as folder:
-        kept = [keep] if isinstance(keep, str) else keep
         data = _sweep(scene, design, Path(folder), kept, workers, dask, progress)
         if out is not None:
             from cosim.studies.sweep import figure
