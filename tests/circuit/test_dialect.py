@@ -71,10 +71,12 @@ def test_polynomials_have_their_coefficients_in_spices_order(tmp_path: Path) -> 
         f"F4 0 f4 POLY(1) V2 {' '.join(factors.split()[:4])}\nR5 f4 0 1",
         f"H5 h5 0 POLY (1) V2 {' '.join(factors.split()[:4])}",
         ".param k=-1.5\nE6 e6 0 POLY(2) b 0 c 0 {k+1} 0 {2*k}",
+        "E7 e7 0 POLY(1) b 0 0",
     )
     result = spice.run(tmp_path, "\n".join(["title", *lines, ".tran 1u 10u", ".end"]))
     for node, true in {
         "e1": one, "e2": two, "g3": three, "f4": current, "h5": current, "e6": -0.5 - 3 * y,
+        "e7": 0,
     }.items():  # fmt: skip
         assert result[node][-1] == pytest.approx(true, rel=1e-6), node
 
@@ -90,6 +92,7 @@ PARTS = {
     "R9 x 0 4k7 tol=1": lambda s: 4700 + 0 * s,
     "R9 x 0 4k7 TC=0,0": lambda s: 4700 + 0 * s,
     "R9 x 0 4k TC=1e-2 , {2*1e-4}\n.temp 37": lambda s: 4000 * (1.1 + 0.02) + 0 * s,
+    "R9 x 0 4k TC 1e-2  2e-4\n.temp 37": lambda s: 4000 * (1.1 + 0.02) + 0 * s,
     "G9 x 0 x 0 1m Rpar=1k Cpar=1n": lambda s: 1 / (2e-3 + 1e-9 * s),
     "L1 x y 1m\nL2 y z 1m\nL3 z 0 1m\nK1 L1 L2 L3 0.5": lambda s: s * (3e-3 + 6 * 0.5e-3),
 }
@@ -985,6 +988,25 @@ def test_faults_of_a_library_matter_where_they_are_used(
         return
     with pytest.raises(BadInput, match=f"^{told}"):
         anew(tmp_path, text)
+
+
+def test_a_library_ends_subcircuits_by_end_and_its_other_parts_are_left_out(tmp_path: Path) -> None:
+    """LTspice's help: a .lib includes definitions, elements at global scope are ignored."""
+    library = "Some words, 2005\n.ends\n.subckt a p q\nR1 p q 1k\n.END  a\nV1 p 0 1\n.model D D\n"
+    (tmp_path / "own.lib").write_text(f"{library}.end\n.subckt b p q\nR1 p q 2k\n.ends\n.END\n")
+    found = anew(tmp_path, "X1 in b a\nX2 in b b\n.lib own.lib")
+    assert found[-7:] == [
+        ".subckt a p q", "r1 p q 1k", ".ends", ".model d d", ".subckt b p q", "r1 p q 2k", ".ends"
+    ]  # fmt: skip
+    told = [line for line in read_all(tmp_path / "own.cir")[1] if line.text.startswith(".told")]
+    assert [line.place for line in told] == ["own.lib:1"]
+
+
+@needs.ngspice_library
+@pytest.mark.parametrize("name", ["LM12/NS", "IR-2110", "a+b", "OPA541.1"])
+def test_a_subcircuit_with_parameters_may_have_any_name(name: str, tmp_path: Path) -> None:
+    lines = f"X1 b x {name} r=3k\nR9 x 0 1k\n.subckt {name} p q r=1k\nR1 p q {{r}}\n.ends {name}"
+    assert columns_of(tmp_path, lines, "v(x)")["v(x)"] == pytest.approx(0.5, rel=1e-6)
 
 
 @needs.ngspice_library

@@ -202,12 +202,14 @@ class _Reader:
             raise BadInput(f"{name}: cannot be read ({error.strerror}).") from error
 
     def _take(
-        self, lines: Iterator[Line], opened: tuple[Path, ...], section: str | None = None
-    ) -> bool:
+        self, lines: Iterator[Line], opened: tuple[Path, ...], section: str | None = None,
+        library: bool = False,
+    ) -> bool:  # fmt: skip
         """Take the lines of a file, the last of ``opened``, or those of a ``section`` between .lib
-        and .endl. Returns whether ``.end``, or the section, was found."""
+        and .endl, or the definitions of a ``library``. Returns whether ``.end``, or the section,
+        was found."""
         inside = section is None
-        found = False
+        found = outside = False
         for line in lines:
             word, rest = _directive(line)
             if section is not None and word in (".lib", ".endl"):
@@ -224,12 +226,21 @@ class _Reader:
                 self._add(self.dropped, replace(line, text=told))
             if word in _INLINED:
                 self._inline(line, rest, opened)
-            elif word == ".end" and section is None:
+            elif word == ".end" and opened[1:]:  # libraries end subcircuits by it
+                if self.depth > 0:
+                    self.depth -= 1
+                    self._add(self.lines, replace(line, text=".ends"))
+            elif word == ".end":
                 for after in lines:
                     refuse(after, "there is text after .end, which must come last")
                 return True
+            elif library and not word and self.depth < 1:
+                if not outside:
+                    told = ".told parts outside subcircuits have no effect in a .lib, as in LTspice"
+                    self._add(self.dropped, replace(line, text=f"{told}; .include takes them"))
+                outside = True
             elif kept := self._passed(line, opened[-1]):
-                self.depth += (word == ".subckt") - (word == ".ends")
+                self.depth = max(0, self.depth + (word == ".subckt") - (word == ".ends"))
                 self._add(self.lines, kept)
             else:
                 self._add(self.dropped, line)
@@ -271,7 +282,8 @@ class _Reader:
             refuse(line, f"files are included more than {MAX_INCLUDES} times")
         file = shown(path.relative_to(self.folder).as_posix())
         lines = _logical(self._text(path, line), file, 1)
-        if not self._take(lines, (*opened, path), section) and section:
+        library = line.text.lower().startswith(".lib") and not section
+        if not self._take(lines, (*opened, path), section, library) and section:
             refuse(line, f"{shown(name)} has no section {shown(section)}")
 
     def _with_points(self, line: Line, base: Path) -> Line:

@@ -96,7 +96,7 @@ _WITHIN = re.compile(rf"v\s*\([^()]*\)|(?<![\w.$#]){_SPLIT}(?![\w.])", re.IGNORE
 """4k7 in an expression. Node names within v(…) are matched first, without groups, to be kept."""
 _POINT = re.compile(r"^(\d+)r(\d+)(?!\S)", re.IGNORECASE)  # 4r7 for 4.7 ohm
 _VALUED = re.compile(r"(?<=\s)value\s*=?\s*(?={)", re.IGNORECASE)
-_TC = re.compile(rf"\btc\s*=\s*{_VALUE}(?:[\s,]+{_VALUE}(?!\s*=))?", re.IGNORECASE)
+_TC = re.compile(rf"(?:\btc\s*=|(?<=\s)tc\s)\s*{_VALUE}(?:[\s,]+{_VALUE}(?!\s*=))?", re.IGNORECASE)
 _TEMP = re.compile(r"\.(?:temp\b[\s=]*|opt\w*\s(?:.*[\s,])?temp\s*=\s*)(\{[^{}]*\}|[^\s,]+)", re.I)
 _WARMTH = re.compile(r"(?<![\w.])temp(?!\w|\s*[=(])")
 _SYNONYMS = {".params": ".param", ".define": ".param", "cap": "c", "ind": "l"}
@@ -654,8 +654,9 @@ def _polynomial(found: list[str], kind: str) -> str | None:
         return None
     dimension, each = int(found[1]), 2 if kind in "eg" else 1
     read, factors = found[2 : 2 + each * dimension], found[2 + each * dimension :]
-    if any("=" in word for word in found) or not 1 + (dimension == 1) <= len(factors) <= _MOST:
-        return None  # of one coefficient programs disagree whether it is the constant
+    least = 1 if dimension > 1 or [*map(number, factors)] == [0.0] else 2
+    if any("=" in word for word in found) or not least <= len(factors) <= _MOST:
+        return None  # of one coefficient but 0 programs disagree whether it is the constant
     pairs = zip(*[iter(read)] * each, strict=True)  # groups of ``each`` consecutive words
     inputs = [f"{'v' if each == 2 else 'i'}({','.join(names)})" for names in pairs]
     degrees = (combinations_with_replacement(inputs, degree) for degree in count())

@@ -76,9 +76,18 @@ def written(line: Line, element: Element | None, values: Mapping[str, float]) ->
         return _model(line)
     if word in (".ic", ".nodeset"):
         return f"{word} {' '.join(_initial(line, text[len(word) :].lower()))}"
-    if word in (".subckt", ".ends", ".global"):
+    if word == ".subckt":
+        _, name, *rest = words(text)
+        return " ".join([word, *(_word(line, each) for each in (_called(name), *rest))])
+    if word in (".ends", ".global"):
         return " ".join([word, *(_word(line, each) for each in words(text)[1:])])
     return _expression(line, text)  # of functions and conditions; options are numbers
+
+
+def _called(name: str) -> str:
+    """A subcircuit's name in letters and digits: ngspice does not find one with parameters that is
+    called ``LM12/NS`` or ``IR-2110``."""
+    return re.sub(r"[^\w{}()='\",]", lambda odd: f"_{ord(odd[0]):x}_", name)
 
 
 def _element(element: Element) -> str:
@@ -94,7 +103,8 @@ def _element(element: Element) -> str:
             cure = _ELSEWHERE.get(key, "leave it out if the circuit is the same without it")
             element.refuse(f": {shown(key)} is nothing that ngspice knows of it; {cure}")
     head = [element.name, *element.nodes, *element.controls]
-    head += [element.model] if element.model else []
+    if element.model:
+        head.append(_called(element.model) if element.kind == "x" else element.model)
     for part in head:
         if not _HEAD.fullmatch(part):
             element.refuse(f": {shown(part)} is no name")
