@@ -125,7 +125,7 @@ def heats(scene: Scene, energy_copper: float) -> dict[str, Any]:
     """
     coil = scene.coil
     # With a user's netlist ``energy_copper`` has no sense resistor in it.
-    sense = 0.0 if scene.rung.own_netlist else coil.count * scene.circuit.sense_resistance
+    sense = 0.0 if scene.rung.own_netlist else scene.sense
     share = coil.resistance / (coil.resistance + sense)
     coils = coil.count * (1 if scene.drive.phase_deg is None else 2)
     heat = energy_copper / coils / scene.run.duration * share

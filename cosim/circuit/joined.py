@@ -37,7 +37,7 @@ class Edges:
     pulses: tuple[str, ...]
     """ngspice's names of the sources with PULSE."""
     length: float
-    """s, of edges of PULSE that have none."""
+    """s, of edges of PULSE and EXP that have none; 0 without PULSE and EXP."""
 
 
 @dataclass(frozen=True)
@@ -103,15 +103,16 @@ def deck(
         each.line: "\n".join(_external(each, through)) for each in top.elements if each.name in fed
     }
     read_as = reading(netlist.words, len(words) if asked else 0)
+    edges = netlist.edges(fed, max_step, duration)
     return Deck(
-        netlist.text(external, values, duration, reltol, max_step),
+        netlist.text(external, values, duration, reltol, max_step, edges.length),
         {source.lower(): source[0].lower() for source in sources},
         tuple(vector for vector, _ in read_as),
         netlist.words,
         tuple(netlist.measures),
         tuple(without_effect(netlist.dropped)),
         tuple(device if k < len(words) else "" for k, (_, device) in enumerate(read_as)),
-        netlist.edges(fed, max_step, duration),
+        edges,
     )
 
 
@@ -154,15 +155,15 @@ class Checked:
     dropped: Sequence[Line] = ()
     """Lines that ngspice does not see."""
 
-    def edge(self, max_step: float, duration: float) -> float | None:
-        """The length, s, of edges whose rise or fall time is not given; None without PULSE and EXP.
-        Simulators differ in it; here it is the netlist's own step, or a run's longest, but at most
-        1 % of the shortest on-time or period of a PULSE, or without an own one of the run's longest
-        step where an expression has one of these."""
+    def edges(self, fed: Set[str], max_step: float, duration: float) -> Edges:
+        """Those of all sources but the ``fed`` ones. Simulators differ in the length of edges
+        without one; here it is the netlist's own step, or a run's longest, but at most 1 % of the
+        shortest on-time or period of a PULSE, or without an own one of the run's longest step where
+        an expression has one of these."""
         every = (element for _, element, _ in self.top.order)
         sources = [each.words for each in every if each and each.kind in "vi"]
         if not any({"pulse", "exp"} & {*words} for words in sources):
-            return None
+            return Edges((), 0.0)
         own = _own_step(self.dropped)
         lengths = [own or max_step, duration]
         for words in sources:
@@ -170,12 +171,7 @@ class Checked:
                 values = [number(word) for word in words[words.index("pulse") + 1 :]]
                 lengths += [0.01 * value for value in values[5:7] if value]  # on-time and period
                 lengths += [0.01 * max_step] * (None in values[5:7] and own is None)
-        return min(lengths)
-
-    def edges(self, fed: Set[str], max_step: float, duration: float) -> Edges:
-        """Those of all sources but the ``fed`` ones."""
-        length = self.edge(max_step, duration)
-        return Edges((), 0.0) if length is None else Edges((*_pulses(self.top, fed),), length)
+        return Edges((*_pulses(self.top, fed),), min(lengths))
 
     def text(
         self,
@@ -184,10 +180,11 @@ class Checked:
         duration: float,
         reltol: float,
         max_step: float,
+        edge: float,
     ) -> str:
         """The deck for ngspice: the netlist with the lines of ``external`` sources replaced,
         ``values`` for the top level's parameters, a seed for random numbers if the netlist has
-        none, and the analysis."""
+        none, and the analysis; ``edge`` is the length of :class:`Edges`."""
         text = [self.title.text]
         for line, element, holder in self.top.order:
             if holder is self.top and line in external:
@@ -205,7 +202,7 @@ class Checked:
             f".options norefvalue reltol={reltol!r} minbreak={min_break!r}",
             # All vectors are sent step by step; ngspice is to keep none, which would take memory.
             ".save none",
-            f".tran {self.edge(max_step, duration) or max_step!r} {duration!r} 0 {max_step!r}",
+            f".tran {edge or max_step!r} {duration!r} 0 {max_step!r}",
             ".end",
         ]
         return "\n".join(text)
@@ -261,11 +258,11 @@ def checked(
     for ask in asks:
         every |= {each: replace(ask.line, text=each) for each in ask.words if each not in every}
     read_as = reading([*every], len(words) if asked else 0)
-    extra = [
-        _source_of(k, line)
-        for k, line in enumerate(every.values())
-        if read_as[k][0] == f"v({_NODE}{k})"
-    ]
+    extra: list[Line] = []
+    for k, line in enumerate(every.values()):
+        if read_as[k][0] == f"v({_NODE}{k})":
+            extra.append(replace(line, text=f"Bcosim{k} {_NODE}{k} 0 V={line.text}"))
+            passed(extra[-1])  # raises BadInput for what may not stand in a netlist
     _check_vectors(top, every.values())
     required = [[source.lower() for source in sources]] if required is None else required
     return Checked(lines[0], check([*lines, *extra], required), tuple(every), asks, dropped)
@@ -286,13 +283,6 @@ def reading(words: Sequence[str], asked: int = 0) -> list[tuple[str, str]]:
         else:
             found.append((f"v({_NODE}{k})", f"@bcosim{k}[v]"))
     return found
-
-
-def _source_of(place: int, words: Line) -> Line:
-    """A source whose voltage is the expression; refused like a line of the netlist."""
-    line = replace(words, text=f"Bcosim{place} {_NODE}{place} 0 V={words.text}")
-    passed(line)  # raises BadInput for what may not stand in a netlist
-    return line
 
 
 def _check_vectors(top: Scope, wanted: Iterable[Line]) -> None:

@@ -14,7 +14,6 @@ from pathlib import Path
 from cosim.circuit.joined import Checked, Edges, checked, own_parameters, reading
 from cosim.circuit.lint.checks import REQUIRED as AGREED
 from cosim.circuit.lint.deck import Line, read, refuse
-from cosim.circuit.lint.elements import Element
 from cosim.circuit.outputs import Measure, measures, without_effect
 from cosim.files.resources import circuits
 from cosim.scene import Scene
@@ -79,29 +78,34 @@ def prepare(scene: Scene) -> tuple[str, dict[str, str], Edges]:
         netlist = _checked(path, scene.renamed, asked, scene.circuit.save or ())
         words |= {f"{OWN}{each}": each for each in netlist.words}
     title, elements = netlist.title, netlist.top.elements
-    external = _external_sources(elements, scene.renamed)
     present = {node for element in elements for node in element.nodes}
     names = {element.name for element in elements}
-    own_form = not scene.renamed or any(names.issuperset(each) for each in AGREED)
+    agreed = next((each for each in AGREED if names.issuperset(each)), ())
+    fed = {name.lower() for name in _joined_sources(scene.renamed)} or {*agreed}
+    external = {
+        each.line: " ".join([each.name, *each.nodes, "external"])
+        for each in elements
+        if each.name in fed
+    }
     companion = scene.coupling.method == "companion"
     if companion:
         emf = scene.renamed.get("machine.back_emf", "vemf").lower()
         _carry_inertia(external, title, present, emf)
     values = parameters(scene) | own_parameters(netlist.top, str(path), scene.circuit.param or {})
     circuit, duration = scene.circuit, scene.run.duration
-    text = netlist.text(external, values, duration, circuit.reltol, circuit.max_step)
+    edges = netlist.edges(fed, circuit.max_step, duration)
+    text = netlist.text(external, values, duration, circuit.reltol, circuit.max_step, edges.length)
     for node in ("out", "sense"):
         if f"v({node})" not in words and node not in present:
             port = f', or a [[port]] to "machine.{node}"' if scene.renamed else ""
             refuse(title, f"the netlist must have a node {node}, one of the coil's two ends{port}")
     saved = {name: name for name in REQUIRED}
-    saved |= {f"v({name})": f"v({name})" for name in OPTIONAL if own_form and name in present}
+    saved |= {f"v({name})": f"v({name})" for name in OPTIONAL if agreed and name in present}
     if companion:
         saved[MOTIONAL] = MOTIONAL
     vectors = dict(zip(netlist.words, reading(netlist.words), strict=True))
     saved |= {name: vectors[word][0] for name, word in words.items()}
-    fed = {element.name for element in elements if element.line in external}
-    return text, saved, netlist.edges(fed, circuit.max_step, duration)
+    return text, saved, edges
 
 
 def _words(scene: Scene) -> dict[str, str]:
@@ -113,8 +117,8 @@ def _words(scene: Scene) -> dict[str, str]:
 def _checked(
     path: Path, renamed: Mapping[str, str], words: Sequence[str], saved: Collection[str] = ()
 ) -> Checked:
-    sources = [renamed[end] for end in _SOURCES if renamed]
-    return checked(path, sources, words, None if renamed else AGREED, "v", saved=saved)
+    required = None if renamed else AGREED
+    return checked(path, _joined_sources(renamed), words, required, "v", saved=saved)
 
 
 @cache
@@ -130,20 +134,9 @@ def asked_for(scene: Scene) -> tuple[list[Measure], list[str]]:
     return measures(dropped), [*without_effect(dropped)]
 
 
-_SOURCES = ("machine.back_emf", "drive")
-"""The ends of ports that join the sources of a netlist to the machine."""
-
-
-def _external_sources(elements: Sequence[Element], renamed: Mapping[str, str]) -> dict[Line, str]:
-    """External sources in place of the agreed ones, or of those that ports join; by their lines."""
-    present = {element.name for element in elements}
-    agreed: Sequence[str] = [renamed[end].lower() for end in _SOURCES] if renamed else ()
-    agreed = agreed or next(names for names in AGREED if present >= set(names))
-    return {
-        each.line: " ".join([each.name, *each.nodes, "external"])
-        for each in elements
-        if each.name in agreed
-    }
+def _joined_sources(renamed: Mapping[str, str]) -> list[str]:
+    """The netlist's sources that ports join to the machine, if any do."""
+    return [renamed[end] for end in ("machine.back_emf", "drive") if renamed]
 
 
 def _carry_inertia(external: dict[Line, str], title: Line, present: set[str], emf: str) -> None:

@@ -8,7 +8,7 @@ import math
 
 from cosim.errors import SimulationFailed
 from cosim.mechanics.stickslip import Mechanics
-from cosim.scene import Scene, keys
+from cosim.scene import KEYS, Scene
 
 BUDGET = 3e8
 """Internal steps of the FMU that a run may take beside communication steps: some minutes."""
@@ -60,7 +60,7 @@ def _furthest(scene: Scene) -> str:
         return abs(math.log10(abs(value / default))) if value else 1.0
 
     found = []
-    for key in keys():
+    for key in KEYS.values():
         if key.table in ("coil", "mechanics") and key.kind is float and key.default is not None:
             value = getattr(getattr(scene, key.table), key.name)
             shown = f"{key.full} = {value:g}" + ("" if key.unit == "1" else f" {key.unit}")

@@ -17,7 +17,7 @@ from cosim.arrays import Array
 from cosim.errors import SimulationFailed
 from cosim.mechanics.fmi import borrow, give_back
 from cosim.mechanics.normal_force import normal_force
-from cosim.scene import Scene, keys
+from cosim.scene import KEYS, Scene
 from cosim.stepper.stepper import RIG, numbers
 from cosim.toolchain.libraries import library
 
@@ -60,7 +60,9 @@ SOURCE_TOTALS = (
 INTERNAL = ("internal_steps", "internal_rejected")
 COUNTERS = ("impacts", "stick_slip_events", *INTERNAL)
 
-_KEYS = [[key for key in keys() if key.variable and key.kind is kind] for kind in (float, int)]
+_KEYS = [
+    [key for key in KEYS.values() if key.variable and key.kind is kind] for kind in (float, int)
+]
 _VARIABLES = [
     ([key.variable for key in group], attrgetter(*(key.full for key in group))) for group in _KEYS
 ]

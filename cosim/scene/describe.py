@@ -90,12 +90,21 @@ KEYS = {
     for table, model in TABLES.items()
     for name in model.model_fields
 }
-"""Every key by its full name."""
+"""Every key of every table by its full name, in order."""
 
 
-def keys() -> tuple[Key, ...]:
-    """Every key of every table, in order."""
-    return tuple(KEYS.values())
+_LAWS = {
+    ("mechanics.suspension", "cubic"): ("suspension_k2", "suspension_k3"),
+    ("mechanics.suspension", "knee"): ("suspension_knee", "suspension_hardening"),
+    ("mechanics.suspension", "repulsion"): ("suspension_repulsion", "suspension_distance"),
+    ("mechanics.contact", "rigid"): ("restitution",),
+    ("mechanics.contact", "compliant"): ("contact_stiffness", "contact_damping"),
+}
+ACT_WITH = {f"mechanics.{key}": choice for choice, own in _LAWS.items() for key in own} | {
+    "run.step": ("run.solver", "fast")
+}
+"""Keys that act only with one value of another key: the other key, and that value. On circuit,
+waveform and method :func:`acts` decides."""
 
 
 def acts(key: Key, rung: Rung, waveform: str, method: CouplingMethod) -> bool:

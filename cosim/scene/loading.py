@@ -9,7 +9,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
 from math import isfinite
-from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +18,10 @@ from cosim.errors import BadInput, NoEffect, Note, plain
 from cosim.files import link, reader
 from cosim.files.resources import circuits, compiled_fmus
 from cosim.scene import messages, toml
-from cosim.scene.describe import KEYS, acts, keys
+from cosim.scene.describe import ACT_WITH, KEYS
 from cosim.scene.model import Scene, toml_value
 from cosim.scene.rungs import METHODS
 from cosim.scene.tables import (
-    ACT_WITH,
     KNOBS,
     LEVEL_KEY,
     NORMAL_FORCES,
@@ -410,13 +408,16 @@ def _tell_doubts(scene: Scene, layers: list[_Layer]) -> None:
     has every key.
     """
     origins = _origins(layers)
-    chosen = scene.rung, scene.drive.waveform, METHODS[scene.coupling.method]
-    every = [k for k in keys() if k.default is not None and k.name not in _TWINS.get(k.table, {})]
+    every = [
+        key
+        for key in KEYS.values()
+        if key.default is not None and key.name not in _TWINS.get(key.table, {})
+    ]
     silent = [
         layer.builtin or all(key.name in layer.tables.get(key.table, {}) for key in every)
         for layer in layers
     ]
-    for key in keys():
+    for key in KEYS.values():
         rank, origin = origins.get(key.full, (-1, ""))
         if rank < 0 or silent[rank]:
             continue
@@ -428,20 +429,12 @@ def _tell_doubts(scene: Scene, layers: list[_Layer]) -> None:
         if 0.0 < FAR * usual <= values[-1]:
             words = f"{key.full} = {values[-1]:g} {key.unit} is far from the usual {usual:g}"
             warnings.warn(f"{origin}: {words}; keys are in SI units.", Note, stacklevel=3)
-        choice, acting = ACT_WITH.get(key.full, ("circuit.model", None))
-        choices = [choice]
+        choices = [ACT_WITH.get(key.full, ("circuit.model", ""))[0]]
         choices += ["drive.waveform"] * (key.table == "drive")
         steered = key.table == "circuit" and key.name in METHODS[scene.coupling.method].chooses
         choices += ["coupling.method"] * (steered or key.table == "coupling")
         latest = max(origins.get(choice, (-1, ""))[0] for choice in choices)
         if rank < latest or scene.has_ports:  # keys of the built-in machine mean nothing there
             continue
-        chosen_law = attrgetter(choice)(scene) if acting else None
-        if acting != chosen_law:
-            idle = f'{key.full} has no effect with {choice} = "{chosen_law}"'
-            idle += f'; it acts with "{acting}"'
-        elif not acts(key, *chosen):
-            idle = messages.idle(key, *chosen)
-        else:
-            continue
-        warnings.warn(f"{origin}: {idle}.", NoEffect, stacklevel=3)
+        if idle := messages.idle(key, scene):
+            warnings.warn(f"{origin}: {idle}.", NoEffect, stacklevel=3)

@@ -5,14 +5,15 @@ from collections.abc import Iterable, Mapping
 from itertools import islice
 from math import inf
 from numbers import Integral
+from operator import attrgetter
 from typing import Any
 
 from pydantic import ValidationError
 
 from cosim.errors import BadInput, plain
-from cosim.scene.describe import KEYS, Key, acts, described, keys
-from cosim.scene.model import toml_value
-from cosim.scene.rungs import METHODS, RUNGS, CouplingMethod, Rung
+from cosim.scene.describe import ACT_WITH, KEYS, Key, acts, described
+from cosim.scene.model import Scene, toml_value
+from cosim.scene.rungs import METHODS, RUNGS
 from cosim.scene.tables import GIVEN_SURFACES, PORT_LISTS, TABLES
 
 ALLOWED_TOP = {
@@ -44,7 +45,7 @@ def suggestion(word: str, known: Iterable[str], what: str = "") -> str:
 
 def full_name(bare: str) -> str:
     """``; did you mean table.key?`` if a key is called ``bare``, else the empty string."""
-    full = next((key.full for key in keys() if key.name == bare), None)
+    full = next((key.full for key in KEYS.values() if key.name == bare), None)
     return f"; did you mean {full}?" if full else ""
 
 
@@ -70,7 +71,7 @@ def unknown_table(name: str) -> str:
 
 def unknown_key(table: str, name: str) -> str:
     """A sentence on a key that its table does not have."""
-    known = [key.name for key in keys() if key.table == table]
+    known = [key.name for key in KEYS.values() if key.table == table]
     full = f"{table}.{name}"
     hint = (
         full_name(name)
@@ -81,14 +82,21 @@ def unknown_key(table: str, name: str) -> str:
     return f'there is no key "{plain(full)}"{hint}'
 
 
-def idle(key: Key, rung: Rung, waveform: str, method: CouplingMethod) -> str:
-    """A sentence on a key without effect with this rung, ``drive.waveform`` and coupling method."""
+def idle(key: Key, scene: Scene) -> str:
+    """A sentence on a key that has no effect in a scene; empty where it has one."""
 
     def listed(names: Iterable[str]) -> str:
         *rest, last = [f'"{name}"' for name in names]
         return f"{', '.join(rest)} or {last}" if rest else last
 
     lead = f"{key.full} has no effect with"
+    if key.full in ACT_WITH:
+        choice, acting = ACT_WITH[key.full]
+        if (chosen := attrgetter(choice)(scene)) != acting:
+            return f'{lead} {choice} = "{chosen}"; it acts with "{acting}"'
+    rung, waveform, method = scene.rung, scene.drive.waveform, METHODS[scene.coupling.method]
+    if acts(key, rung, waveform, method):
+        return ""
     if key.table == "circuit" and key.name in method.chooses:
         return f'{lead} coupling.method = "{method.name}", which chooses it'
     if key.table == "coupling" and rung.ngspice:

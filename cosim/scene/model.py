@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
 from cosim.errors import BadInput
 from cosim.scene import firmware
-from cosim.scene.describe import KEYS, Key, keys
+from cosim.scene.describe import KEYS, Key
 from cosim.scene.rungs import OF_PORTS, RUNGS, Rung
 from cosim.scene.tables import (
     COMMANDS,
@@ -67,7 +67,7 @@ _FAST_NEEDS: list[tuple[str, Sequence[object], str]] = [
     ("friction.normal_force_file", (None,), "absent"),
     *(
         (key.full, (key.default,), "absent" if key.default is None else f"{key.default:g}")
-        for key in keys()
+        for key in KEYS.values()
         if key.variable and key.variable not in _FAST
     ),
 ]
@@ -231,7 +231,7 @@ class Scene(BaseModel):
             return
         coil = self.coil
         eddy = coil.eddy_resistance or 0.0
-        around = coil.resistance + coil.count * self.circuit.sense_resistance + eddy
+        around = coil.resistance + self.sense + eddy
         for key, resistance in (("inductance", around), ("eddy_inductance", eddy)):
             inductance = getattr(coil, key)
             if inductance is not None and inductance < FASTEST * resistance:
@@ -247,7 +247,7 @@ class Scene(BaseModel):
         """At the output's limits each step of ngspice is as short as the coil's time constant."""
         drive, circuit, coil = self.drive, self.circuit, self.coil
         peak, sense = abs(drive.offset) + drive.amplitude / 2.0, circuit.sense_resistance
-        around = coil.resistance + coil.count * sense
+        around = coil.resistance + self.sense
         needed = min(peak / sense, circuit.current_limit) * around / coil.count
         room = circuit.supply - min(circuit.swing_loss_high, circuit.swing_loss_low)
         least = (FASTEST_FAR if needed > FAR * room else FASTEST_NEAR) * around
@@ -431,6 +431,11 @@ class Scene(BaseModel):
         return RUNGS[self.circuit.model]
 
     @property
+    def sense(self) -> float:
+        """The sense resistor as the current of one coil sees it, Ohm: it carries that of all."""
+        return self.coil.count * self.circuit.sense_resistance
+
+    @property
     def surface_is_given(self) -> bool:
         """Whether the drive prescribes the surface's velocity, and only the part moves freely."""
         return not self.rung.driven and self.drive.waveform in GIVEN_SURFACES
@@ -499,7 +504,7 @@ def to_toml(scene: Scene, base: str = "", folder: str | os.PathLike[str] | None 
     lines = [f"{key} = {toml_value(value)}" for key, value in first.items()]
     for table in TABLES:
         lines += ["", f"[{table}]"]
-        for key in (key for key in keys() if key.table == table):
+        for key in (key for key in KEYS.values() if key.table == table):
             value = getattr(getattr(scene, table), key.name)
             mark = "" if key.name in data[table] and not base else "# "
             if value is not None and (table, key.name) in PATHS:

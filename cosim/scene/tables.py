@@ -465,19 +465,6 @@ class Mechanics(Table):
             )
 
 
-_LAWS = {
-    ("mechanics.suspension", "cubic"): ("suspension_k2", "suspension_k3"),
-    ("mechanics.suspension", "knee"): ("suspension_knee", "suspension_hardening"),
-    ("mechanics.suspension", "repulsion"): ("suspension_repulsion", "suspension_distance"),
-    ("mechanics.contact", "rigid"): ("restitution",),
-    ("mechanics.contact", "compliant"): ("contact_stiffness", "contact_damping"),
-}
-ACT_WITH = {f"mechanics.{key}": choice for choice, own in _LAWS.items() for key in own} | {
-    "run.step": ("run.solver", "fast")
-}
-"""Keys that act only with one value of another key: the other key, and that value."""
-
-
 class Friction(Table):
     """Friction on the part."""
 

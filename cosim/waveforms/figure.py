@@ -213,7 +213,7 @@ def _command(axis: Axes, scene: Scene, time: Array, cut: dict[str, Array]) -> No
         axis.plot(time, cut["current_2"], color=SECOND, lw=1.1, ls="--", label="second (left)")
     right.set_ylabel("V1 [V]")
     # On these scales the two curves coincide where the current source follows its command.
-    scale = scene.circuit.sense_resistance * scene.coil.count
+    scale = scene.sense
     both = np.concatenate([cut["current"], cut["command"] / scale])
     edge = max(0.05 * np.ptp(both), 0.02)
     low, high = both.min() - edge, both.max() + edge

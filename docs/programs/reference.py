@@ -15,7 +15,7 @@ from pydantic_core import PydanticUndefined
 
 import cosim
 from cosim.cli.main import _parser
-from cosim.scene.describe import Key, keys
+from cosim.scene.describe import KEYS, Key
 from cosim.scene.loading import list_scenes
 from cosim.scene.rungs import METHODS, RUNGS
 from cosim.scene.tables import PORT_LISTS, TABLES
@@ -133,7 +133,7 @@ def scene() -> str:
         parts += [f"## [{name}]", sentence((model.__doc__ or "").partition("\n")[0])]
         rows = [
             [code(key.name), meaning(key), default(key), pretty(key.unit), allowed(key)]
-            for key in keys()
+            for key in KEYS.values()
             if key.table == name
         ]
         parts.append(table(["key", "meaning", "default", "unit", "range"], rows))

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import cosim
 from cosim.cli.main import main
 from cosim.errors import BadInput
-from cosim.scene import Scene, keys, list_scenes, load
+from cosim.scene import KEYS, Scene, list_scenes, load
 from tests.helpers import needs
 from tests.helpers.examples import examples
 
@@ -326,7 +326,13 @@ def loads_or_complains(source: str, overrides: list[str]) -> None:
 
 
 MARKS = ["[", "]", "=", ".", "\n", '"', "'", "{", "}", ",", "#", " ", "1", "-", "e", "true", "nan"]
-WORDS = ["base", "name", "paper", *{key.table for key in keys()}, *{key.name for key in keys()}]
+WORDS = [
+    "base",
+    "name",
+    "paper",
+    *{key.table for key in KEYS.values()},
+    *{key.name for key in KEYS.values()},
+]
 TOML_LIKE = st.lists(st.sampled_from(MARKS + sorted(WORDS)), max_size=30).map("".join)
 
 
@@ -345,7 +351,7 @@ VALUE = st.one_of(
 )  # fmt: skip
 OPTION = st.one_of(
     st.text(max_size=30),
-    st.builds("{}={}".format, st.sampled_from([key.full for key in keys()]), VALUE),
+    st.builds("{}={}".format, st.sampled_from([key.full for key in KEYS.values()]), VALUE),
 )
 
 

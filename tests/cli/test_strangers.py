@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from cosim.cli.main import main
-from cosim.scene import keys
+from cosim.scene import KEYS
 
 pytestmark = [pytest.mark.reliability, pytest.mark.usefixtures("undrawn")]
 
@@ -33,7 +33,7 @@ def test_a_scene_writes_nothing_outside_its_folder(
     (home / "precious").write_text("mine")
     monkeypatch.chdir(home)
     quoted = "".join(f"\\u{ord(letter):04x}" for letter in word)
-    texts = [key.full for key in keys() if key.kind is str]
+    texts = [key.full for key in KEYS.values() if key.kind is str]
     assert {"circuit.netlist", "drive.file", "friction.normal_force_file"} <= set(texts)
     before = everything(home)
     for name in (None, *texts):

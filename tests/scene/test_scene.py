@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from cosim.errors import BadInput, NoEffect, Note
 from cosim.mechanics import package
-from cosim.scene import RUNGS, Key, Scene, changed, keys, list_scenes, load, to_toml
+from cosim.scene import KEYS, RUNGS, Key, Scene, changed, list_scenes, load, to_toml
 from cosim.scene.rungs import METHODS
 from cosim.scene.tables import Circuit, Coupling
 from tests.helpers.examples import examples
@@ -143,10 +143,10 @@ FILES = ("circuit.netlist", "drive.file", "friction.normal_force_file")
 
 
 def test_every_key_is_described() -> None:
-    assert {(key.table, key.name) for key in keys()} == {
+    assert {(key.table, key.name) for key in KEYS.values()} == {
         (table, name) for table, names in DEFAULTS.items() for name in names
     }
-    for key in keys():
+    for key in KEYS.values():
         assert key.text and "\n" not in key.text
         assert key.default == DEFAULTS[key.table][key.name]
         numeric = key.kind in (int, float)
@@ -171,7 +171,7 @@ ABSENT = {"coil.eddy_inductance": (None, 1e-9), "coil.eddy_resistance": (None, 1
 
 
 def test_keys_of_the_mechanics_are_those_of_the_fmu(fmu_variables: dict[str, Any]) -> None:
-    shared = [key for key in keys() if key.variable]
+    shared = [key for key in KEYS.values() if key.variable]
     assert len(shared) > 25
     for key in shared:
         variable = fmu_variables[key.variable]
@@ -185,7 +185,7 @@ def test_keys_of_the_mechanics_are_those_of_the_fmu(fmu_variables: dict[str, Any
 def test_parameters_of_the_fmu_that_are_no_keys(fmu_variables: dict[str, Any]) -> None:
     """Every other parameter of the FMU is one that the program sets or leaves alone."""
     parameters = {name for name, v in fmu_variables.items() if v.causality == "parameter"}
-    assert parameters - {key.variable for key in keys()} == {
+    assert parameters - {key.variable for key in KEYS.values()} == {
         "output_high", "output_low",  # from supply and swing losses
         "contact", "suspension", "ram_fixed", "independent", "prescribed", "source",
     }  # fmt: skip
@@ -390,7 +390,7 @@ def test_knob_and_value_replace_each_other_between_layers(tmp_path: Path) -> Non
 def test_text_is_deterministic_and_complete() -> None:
     text = to_toml(load("reference"))
     assert text == to_toml(load("reference"))
-    for key in keys():
+    for key in KEYS.values():
         assert (f"\n{key.name} = " in text) == (key.default is not None), key.full
         (line,) = (line for line in text.splitlines() if line.endswith(key.text))
         assert line.startswith((f"{key.name} = ", f"# {key.name} =   # "))
@@ -429,7 +429,7 @@ def _values(key: Key) -> st.SearchStrategy[Any]:
 
 
 TEXT = st.text(st.characters(exclude_categories=["Cc", "Cs"]), max_size=50)
-SOME_KEYS = st.lists(st.sampled_from(keys()), max_size=6, unique=True)
+SOME_KEYS = st.lists(st.sampled_from([*KEYS.values()]), max_size=6, unique=True)
 
 
 @examples(150)

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.scene import Scene, keys, load
+from cosim.scene import KEYS, Scene, load
 from cosim.simulation.simulate import simulate
 from cosim.waveforms.result import Result
 
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.physics
 
 GOLDEN = json.loads((Path(__file__).parents[1] / "reference" / "golden.json").read_text())
 CASES = {case["name"]: case for case in GOLDEN["cases"]}
-FULL_NAME = {key.name: key.full for key in keys()}
+FULL_NAME = {key.name: key.full for key in KEYS.values()}
 
 # Allowed differences of a trajectory's samples in the first 60 ms, SI: about five times what the
 # coupling's error makes; without ngspice only the two integrators differ, and by 2e-7 of half its

@@ -77,7 +77,6 @@ class Lead(ngspice.Leader):
         self._block = np.zeros((_POINTS, width))
         self.places = (c_int64 * (len(self._saved) + 1))()
         self._time = 0.0
-        coil, loop_resistance = scene.coil, scene.circuit.sense_resistance * scene.coil.count
         motional = self._saved.index(MOTIONAL) if MOTIONAL in self._saved else -1
         swing = self._saved.index("v(swing)") if "v(swing)" in self._saved else -1
         self.state = LeadState(
@@ -85,10 +84,10 @@ class Lead(ngspice.Leader):
             macro_point=address("macro_point_step_locked"),
             gain=GAIN,
             v_offset=command.v_offset,
-            count=coil.count,
+            count=scene.coil.count,
             after_jump=after_jump(scene),
             fineness=_fineness(scene),
-            time_constant=coil.inductance / (coil.resistance + loop_resistance),
+            time_constant=scene.coil.inductance / (scene.coil.resistance + scene.sense),
             range=scene.drive.amplitude or 1.0,
             emf_change=_EMF_CHANGE * scene.circuit.supply,
             max_step=scene.circuit.max_step,

@@ -40,7 +40,7 @@ class Amplifier:
     def __init__(self, scene: Scene, command: Command) -> None:
         circuit, coil = scene.circuit, scene.coil
         self._command = command
-        self._sense = circuit.sense_resistance * coil.count  # as one coil's current sees it
+        self._sense = scene.sense
         self._loop = coil.resistance + self._sense
         self._inductance = coil.inductance
         self._pole = 2.0 * np.pi * circuit.gain_bandwidth

@@ -107,7 +107,7 @@ def regulated_coil(
     ``sine`` = (A, f) in V and Hz, whose A sin and A cos are two more states.
     """
     circuit, inductance = scene.circuit, scene.coil.inductance
-    sense, rate = circuit.sense_resistance * scene.coil.count, 2.0 * np.pi * circuit.gain_bandwidth
+    sense, rate = scene.sense, 2.0 * np.pi * circuit.gain_bandwidth
     leak = rate / 10.0 ** (circuit.open_loop_gain / 20.0)
     loop = scene.coil.resistance + sense
     a = [[-loop / inductance, 1.0 / inductance], [-rate * sense, -leak]]

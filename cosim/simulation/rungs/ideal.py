@@ -18,7 +18,7 @@ from cosim.toolchain.libraries import library
 def drive(scene: Scene, recorder: Recorder) -> Driven:
     """The current is given; the coil's voltage follows from it."""
     drives = commands(scene)
-    share = 1.0 / (scene.circuit.sense_resistance * scene.coil.count)
+    share = 1.0 / scene.sense
     coils = [_Coil(scene) for _ in drives]
     for edges, start, end in straights(drives, scene.run.duration):
         start, end = share * start, share * end
@@ -94,7 +94,7 @@ class _Coil:
         source has no limits, so the energy that it delivers is the sum of all other terms.
         """
         scene, coil = self._scene, self._scene.coil
-        heat = (coil.resistance + coil.count * scene.circuit.sense_resistance) * self._squares / 3.0
+        heat = (coil.resistance + scene.sense) * self._squares / 3.0
         copper = coil.count * (heat + self._eddy.heat)
         held = magnetic(scene, self._last, self._eddy.current)
         return Electrics(

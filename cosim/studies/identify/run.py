@@ -13,7 +13,7 @@ from cosim.errors import BadInput, plain
 from cosim.evaluate.evaluator import workers_asked
 from cosim.evaluate.store import Store, reported
 from cosim.files.picture import Picture
-from cosim.scene import keys
+from cosim.scene import KEYS
 from cosim.studies.identify.problem.space import Space, read_space
 from cosim.studies.identify.problem.targets import WEIGHTS, Measured, own_parameters, read_trials
 from cosim.studies.identify.report import figures, files, solved
@@ -192,6 +192,7 @@ def _folds(plan: Plan, trials: Sequence[Measured]) -> tuple[list[Found], list[Ro
 def _made_up(plan: Plan) -> Found:
     """The rig of the scene keys' defaults, clipped to the bounds, with its best own parameters."""
     space = plan.fine.space
-    defaults: dict[str, Any] = {key.full: key.default for key in keys()}
-    values = [np.clip(defaults[entry.key], entry.low, entry.high) for entry in space.free]
+    defaults: list[Any] = [KEYS[entry.key].default for entry in space.free]
+    ends = zip(defaults, space.free, strict=True)
+    values = [np.clip(default, entry.low, entry.high) for default, entry in ends]
     return plan.drives("made-up rig", space.point(np.array(values)), plan.fine)

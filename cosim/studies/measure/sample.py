@@ -158,8 +158,7 @@ def held_currents(scene: Scene) -> tuple[float, float]:
     """The least and the most current that the device's source can hold in each coil, A: limited by
     its output's swing, and by its current limit."""
     coil, circuit = scene.coil, scene.circuit
-    # ``around`` is the loop's resistance: the one sense resistor carries all coils' currents.
-    around, limit = coil.resistance + coil.count * circuit.sense_resistance, circuit.current_limit
+    around, limit = coil.resistance + scene.sense, circuit.current_limit  # Ohm of the loop; A
     low, high = circuit.swing_loss_low - circuit.supply, circuit.supply - circuit.swing_loss_high
     return max(low / around, -limit / coil.count), min(high / around, limit / coil.count)
 

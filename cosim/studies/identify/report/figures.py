@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from cosim.files.picture import Picture, grid
-from cosim.scene import keys
+from cosim.scene import KEYS
 from cosim.studies.identify.problem.space import OF_LAWS
 from cosim.studies.identify.report.solved import KINDS, Solved, shown
 from cosim.studies.identify.report.verdicts import TRUSTED, forces
@@ -107,7 +107,7 @@ COLOURS = {"cubic": SIMULATED, "knee": OTHER, "repulsion": FLOOR}
 def rigs(found: Solved) -> Picture:
     """The suspension's force on each rig that may be the true one; a panel for each key with the
     rigs' costs over its values, the key's range shaded."""
-    units, space = {key.full: key.unit for key in keys()}, found.best.space
+    units, space = {key.full: key.unit for key in KEYS.values()}, found.best.space
     verdicts = {verdict.key: verdict for verdict in found.verdicts}
     names = [name for name in space.names if name not in OF_LAWS]
     figure, (first, *others) = grid(len(names) + 1, 4, 12.8, 2.8, 0.6)

@@ -7,7 +7,7 @@ import numpy as np
 
 from cosim.arrays import Array, slope
 from cosim.errors import BadInput, Note, SimulationFailed
-from cosim.scene import Scene, keys, load
+from cosim.scene import KEYS, Scene, load
 from cosim.scene.model import toml_value
 from cosim.simulation.simulate import simulate
 from cosim.studies.identify.problem.targets import Measured, own_parameters
@@ -60,7 +60,7 @@ def rounded(settings: Settings, digits: int = RIG_DIGITS) -> Settings:
 def scene_file(description: str, settings: Settings) -> str:
     """A scene file that holds these keys, each with its unit."""
     lines, table = [f"description = {toml_value(description)}"], ""
-    for key in keys():
+    for key in KEYS.values():
         if key.full not in settings:
             continue
         if key.table != table:
