@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise, takewhile
 
-from cosim.circuit.lint.elements import MODEL_TYPES, Element, Scope, parse
+from cosim.circuit.lint.elements import KINDS, Element, Scope, parse
 from cosim.circuit.lint.expressions import Names, body, check_circles, check_names, sensed
 from cosim.circuit.lint.lines import Line, refuse, shown
 from cosim.circuit.lint.topology import check_topology
@@ -89,7 +89,7 @@ def _check_duplicates(scope: Scope) -> None:
 
 def _check_element(element: Element, scope: Scope, names: Names) -> None:
     kind = element.kind
-    if kind in MODEL_TYPES:
+    if KINDS[kind].models:
         _check_model(element, scope)
     if kind in "rcl":
         _check_passive(element, scope, names)
@@ -138,7 +138,7 @@ def _check_model(element: Element, scope: Scope) -> None:
 
 
 def _check_type(element: Element, model: str, types: set[str]) -> None:
-    if types and not types & MODEL_TYPES[element.kind]:
+    if types and not types & word_set(KINDS[element.kind].models):
         element.refuse(f": the model {shown(model)} is of type {shown(min(types))}")
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 from unicodedata import category
 
 from cosim.circuit.lint.dialect import in_ngspice, in_ngspice_together, prelude, since_the_start
+from cosim.circuit.lint.elements import KINDS
 from cosim.circuit.lint.lines import MAX_LINE, Line, refuse, shown, unusable
 from cosim.circuit.lint.words import definitions, number, word_set
 from cosim.errors import BadInput, plain
@@ -40,10 +41,6 @@ DROPPED = word_set(
     ".unprotect .autoconverge .net .savebias"
 )
 """Analyses, output and remarks: a host sets its own; see ``outputs.py``."""
-ELEMENTS = frozenset("bcdefghijklmoqrstvwxz")
-"""First letters of elements. Not A (code models start processes and read files), N (compiled
-Verilog-A), U (translated to code models), P and Y (lossy lines, of no use here)."""
-
 NUMERIC_OPTIONS = word_set(
     "abstol bypass chgtol convabs convlimit convstep cshunt defad defas defl defw gmin gminsteps "
     "itl1 itl2 itl3 itl4 itl5 itl6 keepopinfo klu maxord method minbreak noopiter pivrel pivtol "
@@ -58,7 +55,7 @@ DROPPED_OPTIONS = word_set(
 )
 """Options for output, which a host sets (``interp`` gives wrong waveforms), or other programs'."""
 
-MODELS = word_set("r res c l d npn pnp nmos pmos vdmos njf pjf nmf pmf sw csw vswitch iswitch ltra")
+MODELS = word_set(" ".join(["vswitch iswitch", *(kind.models for kind in KINDS.values())]))
 """Not numd, nbjt, numos, whose cards name files, and no code models."""
 MOS_LEVELS = frozenset("123469")
 """The BSIM models write a log into the working folder."""
@@ -449,7 +446,7 @@ def passed(line: Line) -> str | None:
         return _model(line)
     if word == ".param" and not rest:
         return None
-    if not word and line.text[0].lower() not in ELEMENTS:
+    if not word and line.text[0].lower() not in KINDS:
         name = line.text.split()[0]
         known = f" but {_GATES}" if name[0] in "aA" else ""
         cure = f"{'take a model for PSpice, or ' * bool(known)}write it with R, C and B sources"

@@ -172,7 +172,12 @@ def _pointed(expression: str) -> str:
 
 
 def in_ngspice(line: Line) -> list[Line]:
-    """The line in ngspice's dialect, as one or more lines."""
+    """The line in ngspice's dialect, as one or more lines.
+
+    The order matters: first other programs' forms of elements become B sources, since all that
+    follows is to see their expressions; then expressions are rewritten; last, elements are taken
+    apart, whose parts have expressions that are ngspice's already.
+    """
     text = _KIND.sub(r"\1", _NOISELESS.sub("", line.text.translate(_LETTERS)))
     text = _SIGMA.sub(r"agauss(0,\1,1)", text)
     if drawn := _DRAWN.match(text):
@@ -180,14 +185,19 @@ def in_ngspice(line: Line) -> list[Line]:
         points = ",".join(_WORD.findall(points))
         text = f"b{name} {plus} {minus} i=table(v({plus},{minus}),{points}){text[drawn.end() :]}"
     text = _without_tables(_BY_LAW.sub(r"\1 \2 \3 i=v(\2,\3)/(\4)", text))
-    kind, word = text[:1].lower(), text[:4].lower()
-    if kind in "beg":
+    if text[:1].lower() in "beg":
         text = _VALUED.sub("value=", re.sub(r"'([^']*)'", r"{\1}", text))
         head, equals, rest = text.partition("=")  # a name before a blank is no function to ngspice
         text = head + equals + re.sub(r"(?<![\w.])([a-z_]\w*)\s+\(", r"\1(", rest, flags=re.I)
         text = _TRUTH.sub(lambda truth: f"({truth[1] or truth[2]}>0.5)", text)
-        if len(parts := [*without_laplace(text)]) > 1:
+        if len(parts := [*without_laplace(text)]) > 1:  # B sources, rewritten in their turn
             return [each for part in parts for each in in_ngspice(replace(line, text=part))]
+    return [replace(line, text=" ".join(each.split())) for each in _parts_of(_expressed(text))]
+
+
+def _expressed(text: str) -> str:
+    """A line with its operators, numbers and comparisons in ngspice's spelling."""
+    kind, word = text[:1].lower(), text[:4].lower()
     if word not in (".inc", ".lib"):  # names of files
         text = _LOGIC.sub(lambda match: _LOGICAL[match[0]], text)
         text = text if word == ".mea" else _powers(text)
@@ -200,33 +210,38 @@ def in_ngspice(line: Line) -> list[Line]:
         # Only where some braced expression is not already one pair of parentheses.
         if any(each[0] != "(" or closing(each, 0) < len(each) for each in _COMPOUND.findall(text)):
             text = text.replace("{", "{(").replace("}", ")}")
+    return text
+
+
+def _parts_of(text: str) -> Sequence[str]:
+    """A line as those of which ngspice makes the same: elements with parasitic parts, laws or
+    memory, gates and coils taken apart, directives and models spelt as ngspice has them."""
+    kind = text[:1].lower()
     if kind == "q":  # the substrate in brackets
-        text = re.sub(r"\[([^\s\[\]]+)\]", r"\1", text)
+        return [re.sub(r"\[([^\s\[\]]+)\]", r"\1", text)]
     if kind in "rclvibefgh":
         *parts, own = _with_parts(text, kind)
         own = _source(own) if kind in "efgh" else own
         split = _with_memory if kind in "beg" else _with_law if kind in "rcl" else lambda own: [own]
-        found = [*parts, *split(own)]
-    elif kind == "a":
-        found = _gate(text)
-    elif coils := _COILS.fullmatch(text):
+        return [*parts, *split(own)]
+    if kind == "a":
+        return _gate(text)
+    if coils := _COILS.fullmatch(text):
         pairs = enumerate(combinations(coils[2].split(), 2))
-        found = [f"{coils[1]}_{place} {' '.join(pair)} {coils[3]}" for place, pair in pairs]
-    elif text.lower().startswith((".param", ".define")):
+        return [f"{coils[1]}_{place} {' '.join(pair)} {coils[3]}" for place, pair in pairs]
+    if text.lower().startswith((".param", ".define")):
         word, _, rest = text.partition(" ")
         rest = rest if "=" in rest else _UNEQUAL.sub(r"\1=", f" {rest}")
-        found = [f"{_SYNONYMS.get(word.lower(), word)} {rest}"]
-    elif text.lower().startswith((".ic", ".nodeset")):
-        found = [re.sub(r"\)\s+(?=[{'\d.+-])", ")=", text)]
-    elif model := _MODEL.match(text):
+        return [f"{_SYNONYMS.get(word.lower(), word)} {rest}"]
+    if text.lower().startswith((".ic", ".nodeset")):
+        return [re.sub(r"\)\s+(?=[{'\d.+-])", ")=", text)]
+    if model := _MODEL.match(text):
         remarks = _REMARKS["vdmos"] if model[1].lower() == "vdmos" else _MAKERS
         own = _SYNONYMS.get(model[1].lower(), model[1])
         text = text[: model.start(1)] + own + text[model.end(1) :]
         text = re.sub(r"(?i)(?<=\sako:)\s+", "", text)
-        found = [_taken(text.replace("(", " ( ", 1), remarks)[0]]
-    else:
-        found = [text]
-    return [replace(line, text=" ".join(each.split())) for each in found]
+        return [_taken(text.replace("(", " ( ", 1), remarks)[0]]
+    return [text]
 
 
 def prelude(lines: Sequence[Line]) -> list[Line]:

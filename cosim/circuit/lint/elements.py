@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate
-from typing import NoReturn
+from typing import NamedTuple, NoReturn
 
 from cosim.circuit.lint.lines import COPY, Line, refuse, shown
 from cosim.circuit.lint.words import definitions, split_assignments, words
@@ -15,23 +15,49 @@ from cosim.errors import BadInput
 
 GROUND = "0"
 
-NODES = dict.fromkeys("rclvibefgh", 2) | {"d": 2, "s": 4, "w": 2, "t": 4, "o": 4, "k": 0}
-"""Number of nodes right after the name, where it is fixed (E and G without controlling nodes)."""
-MODEL_PLACES = {"d": (2, 3), "q": (3, 5), "m": (3, 7), "j": (3, 4), "z": (3, 3)}
-"""The smallest and the largest number of nodes before the model's name."""
-MODEL_TYPES = {
-    "r": {"r", "res"},
-    "c": {"c"},
-    "l": {"l"},
-    "d": {"d"},
-    "q": {"npn", "pnp"},
-    "m": {"nmos", "pmos", "vdmos"},
-    "j": {"njf", "pjf"},
-    "z": {"nmf", "pmf"},
-    "s": {"sw"},
-    "w": {"csw"},
-    "o": {"ltra"},
+
+class Kind(NamedTuple):
+    """What ngspice 39 takes of the elements with one first letter."""
+
+    nodes: int
+    """Right after the name (of E and G without controlling ones), or before the model's name at
+    least; X has any number."""
+    most: int = 0
+    """Of nodes, where their number is known by the place of the model's name only; else 0."""
+    models: str = ""
+    """Types of the models that it may have."""
+    keys: str = ""
+    """Keys of its assignments; empty where they are not checked, or by the subcircuit's own."""
+
+
+_WARM = "m temp dtemp"
+
+KINDS = {
+    "b": Kind(2, keys="v i tc1 tc2 temp dtemp reciproctc reciprocm m"),
+    "c": Kind(2, 0, "c", f"c q capacitance ic scale w l tc tc1 tc2 {_WARM}"),
+    "d": Kind(2, 3, "d", f"area pj w l ic off perim lm wm lp wp thermal {_WARM}"),
+    "e": Kind(2, keys="value vol gain tc1 tc2 temp dtemp name"),
+    "f": Kind(2, keys="value gain m"),
+    "g": Kind(2, keys="value cur gain m tc1 tc2 temp dtemp name"),
+    "h": Kind(2, keys="value gain"),
+    "i": Kind(2, keys="dc ac m td"),
+    "j": Kind(3, 4, "njf pjf", f"area ic off {_WARM}"),
+    "k": Kind(0),
+    "l": Kind(2, 0, "l", f"l flux inductance ic nt scale tc tc1 tc2 {_WARM}"),
+    "m": Kind(3, 7, "nmos pmos vdmos", f"l w ad as pd ps nrd nrs ic off thermal {_WARM}"),
+    "o": Kind(4, 0, "ltra", "ic"),
+    "q": Kind(3, 5, "npn pnp", f"area areab areac ic off thermal {_WARM}"),
+    "r": Kind(2, 0, "r res", f"r resistance ac scale w l tc tc1 tc2 tce noisy noise {_WARM}"),
+    "s": Kind(4, 0, "sw"),
+    "t": Kind(4, keys="z0 zo td f nl ic"),
+    "v": Kind(2, keys="dc ac r td portnum z0 pwr freq phase"),
+    "w": Kind(2, 0, "csw"),
+    "x": Kind(0),
+    "z": Kind(3, 3, "nmf pmf", f"area ic off {_WARM}"),
 }
+"""The elements that a netlist may have, by first letter. Not A (code models start processes and
+read files), N (compiled Verilog-A), U (translated to code models), P and Y (lossy lines, of no use
+here)."""
 
 _SPECIAL = {"poly", "table", "laplace", "freq", "value", "vol", "cur", "and", "nand", "or", "nor",
             "vcvs", "vccs"}  # fmt: skip
@@ -307,15 +333,14 @@ def _check_brackets(line: Line) -> None:
 
 def _place(element: Element, scope: Scope) -> None:
     """Split an element's words into nodes, model and the rest."""
-    kind = element.kind
+    kind, (least, most, *_) = element.kind, KINDS[element.kind]
     if kind == "x":
         positional, assigned = split_assignments(element.words)
         if not positional:
             element.refuse(" names no subcircuit")
         *element.nodes, element.model = positional
         element.words = assigned
-    elif kind in MODEL_PLACES:
-        least, most = MODEL_PLACES[kind]
+    elif most:
         places = range(least, min(most + 1, len(element.words)))
         if not places:
             element.refuse(" has too few nodes or no model")
@@ -335,7 +360,7 @@ def _place(element: Element, scope: Scope) -> None:
         if word := next((word for word in element.words if not _FLAG.search(word)), None):
             element.refuse(f": {shown(word)} behind the model has no name; write name=value")
     else:
-        _split(element, NODES[kind])
+        _split(element, least)
     element.nodes = [node(name) for name in element.nodes]
     if kind == "s":
         element.controls, element.nodes = element.nodes[2:], element.nodes[:2]

@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterator, Mapping
 
 from cosim.circuit.lint.deck import MOS_LEVELS, Line, refuse, shown
-from cosim.circuit.lint.elements import Element
+from cosim.circuit.lint.elements import KINDS, Element
 from cosim.circuit.lint.words import NUMBER, closing, definitions, word_set, words
 
 _NAME = re.compile(r"[a-z_][\w.$#]*", re.IGNORECASE)
@@ -21,27 +21,6 @@ _KEY = re.compile(r"([a-z_]\w*)=(?!=)", re.IGNORECASE)
 _PAIR = re.compile(r"([a-z_]\w*)=(.+)", re.IGNORECASE | re.DOTALL)
 _INITIAL = re.compile(r"\s*v\s*\(\s*([^\s(),{}=']+)\s*\)\s*=\s*(\{[^{}]*\}|'[^']*'|[^\s,]+)\s*,?")
 
-_WARM = "m temp dtemp"
-_KEYS = {
-    "r": f"r resistance ac scale w l tc tc1 tc2 tce noisy noise {_WARM}",
-    "c": f"c q capacitance ic scale w l tc tc1 tc2 {_WARM}",
-    "l": f"l flux inductance ic nt scale tc tc1 tc2 {_WARM}",
-    "d": f"area pj w l ic off perim lm wm lp wp thermal {_WARM}",
-    "q": f"area areab areac ic off thermal {_WARM}",
-    "m": f"l w ad as pd ps nrd nrs ic off thermal {_WARM}",
-    "j": f"area ic off {_WARM}",
-    "z": f"area ic off {_WARM}",
-    "t": "z0 zo td f nl ic",
-    "o": "ic",
-    "v": "dc ac r td portnum z0 pwr freq phase",
-    "i": "dc ac m td",
-    "e": "value vol gain tc1 tc2 temp dtemp name",
-    "g": "value cur gain m tc1 tc2 temp dtemp name",
-    "f": "value gain m",
-    "h": "value gain",
-    "b": "v i tc1 tc2 temp dtemp reciproctc reciprocm m",
-}
-"""Keys that elements may have, by kind, in ngspice 39; for calls of subcircuits see ``checks``."""
 _ELSEWHERE = {
     "rser": "write a resistor in series", "lser": "write an inductor in series",
     "rpar": "write a resistor in parallel", "cpar": "write a capacitor in parallel",
@@ -92,14 +71,14 @@ def _called(name: str) -> str:
 
 def _element(element: Element) -> str:
     line = element.line
-    known = _KEYS.get(element.kind)
+    known = word_set(KINDS[element.kind].keys)
     if element.kind in "efgh":
         for word in element.words:
             if cure := _FORMS.get(word.partition("=")[0]):
                 element.refuse(f": {cure}")
     found = [match[1].lower() for match in map(_KEY.match, element.words) if match]
-    for key in found if known is not None else ():
-        if key not in word_set(known or ""):
+    for key in found:
+        if known and key not in known:
             cure = _ELSEWHERE.get(key, "leave it out if the circuit is the same without it")
             element.refuse(f": {shown(key)} is nothing that ngspice knows of it; {cure}")
     head = [element.name, *element.nodes, *element.controls]
