@@ -45,12 +45,24 @@ class Surface:
 
         A surface that repeats itself returns to its height.
         """
+        within = self._within(start, end)
+        a, v, risen, rest = self._of_sine(*within[:3]) if self.turn else self._of_lines(*within[1:])
+        # Heights at the ends of pieces, then at the turning points within them.
+        z = np.concatenate([[0.0], np.cumsum(risen)])
+        z = np.concatenate([z, z[:-1] + rest])
+        ranges = {"a_surface": a, "v_surface": v, "z_surface": z}
+        return {f"{name}_max": float(values.max()) for name, values in ranges.items()} | {
+            f"{name}_min": float(values.min()) for name, values in ranges.items()
+        }
+
+    def _within(self, start: float, end: float) -> tuple[Array, ...]:
+        """Pieces between knots that lie in part between ``start`` and ``end``, of one period or two
+        after it: where each begins (s after the first knot); from when to when it lies there (s
+        after its begin); its length (s), and its velocities at both ends."""
         first = np.floor((start - self.times[0]) / self.period)
         first = min(max(first, 0.0), self.periods - 1.0)
         end = min(end, start + self.period)
         shifts = (first + np.arange(2 if self.periods > 1 else 1)) * self.period
-        # One or two periods of pieces, flat: their begins, times from the first knot and lengths
-        # (s), and velocities at both ends.
         begins = (shifts[:, None] + self.times[:-1]).ravel()
         local, lengths = (np.tile(t, len(shifts)) for t in (self.times[:-1], np.diff(self.times)))
         v0, v1 = (np.tile(v, len(shifts)) for v in (self.velocities[:-1], self.velocities[1:]))
@@ -60,28 +72,29 @@ class Surface:
         before = np.where(closed, begins <= end * (1.0 + 1e-12), begins < end)
         counts = before & (begins + lengths > start)
         begins, local, lengths, v0, v1 = (x[counts] for x in (begins, local, lengths, v0, v1))
-        # From ``low`` to ``high``, s after a piece's begin, it lies between ``start`` and ``end``.
-        low = np.clip(start - begins, 0.0, lengths)
-        high = np.clip(end - begins, 0.0, lengths)
+        low, high = (np.clip(time - begins, 0.0, lengths) for time in (start, end))
+        return local, low, high, lengths, v0, v1
+
+    def _of_sine(self, local: Array, low: Array, high: Array) -> tuple[Array, Array, Array, Array]:
+        """Accelerations and velocities at both ends of the pieces of a sine (2 × pieces), the rise
+        (m) in each, and 0: it turns at its knots alone."""
+        phases = self.turn * np.stack([local + low, local + high])
+        v = self.half * np.sin(phases)
+        a = self.half * self.turn * np.cos(phases)
+        risen = -np.diff(np.cos(phases), axis=0)[0] * self.half / self.turn
+        return a, v, risen, np.zeros_like(risen)
+
+    @staticmethod
+    def _of_lines(
+        low: Array, high: Array, lengths: Array, v0: Array, v1: Array
+    ) -> tuple[Array, Array, Array, Array]:
+        """The same of straight pieces and jumps, with one acceleration each, and the rise (m) from
+        ``low`` to the turning point, where the velocity is 0, within a piece."""
         jump = lengths == 0.0
-        if self.turn:
-            phases = self.turn * np.stack([local + low, local + high])
-            v = self.half * np.sin(phases)
-            a = self.half * self.turn * np.cos(phases)
-            risen = -np.diff(np.cos(phases), axis=0)[0] * self.half / self.turn
-            rest = np.zeros_like(risen)
-        else:
-            slopes = np.divide(v1 - v0, lengths, out=np.zeros_like(v0), where=~jump)
-            v = np.stack([v0 + slopes * low, np.where(high < lengths, v0 + slopes * high, v1)])
-            a = np.where(jump, np.copysign(np.inf, v1 - v0), slopes)
-            risen = 0.5 * (v[0] + v[1]) * (high - low)
-            # Rise from ``low`` to the turning point, where the velocity is 0, within a piece.
-            turns = (v[0] * v[1] < 0.0) & ~jump
-            rest = np.divide(-0.5 * v[0] ** 2, slopes, out=np.zeros_like(risen), where=turns)
-        # Heights at the ends of pieces, then at the turning points within them.
-        z = np.concatenate([[0.0], np.cumsum(risen)])
-        z = np.concatenate([z, z[:-1] + rest])
-        ranges = {"a_surface": a, "v_surface": v, "z_surface": z}
-        return {f"{name}_max": float(values.max()) for name, values in ranges.items()} | {
-            f"{name}_min": float(values.min()) for name, values in ranges.items()
-        }
+        slopes = np.divide(v1 - v0, lengths, out=np.zeros_like(v0), where=~jump)
+        v = np.stack([v0 + slopes * low, np.where(high < lengths, v0 + slopes * high, v1)])
+        a = np.where(jump, np.copysign(np.inf, v1 - v0), slopes)
+        risen = 0.5 * (v[0] + v[1]) * (high - low)
+        turns = (v[0] * v[1] < 0.0) & ~jump
+        rest = np.divide(-0.5 * v[0] ** 2, slopes, out=np.zeros_like(risen), where=turns)
+        return a, v, risen, rest

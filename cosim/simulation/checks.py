@@ -16,9 +16,10 @@ Not detected: several motions that these starts do not separate; a kind of motio
 the simpler circuit, near a border between two kinds; chaos that dies out before the averages begin.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -190,30 +191,40 @@ def _kind(ways: Iterator[Array], length: float, averaged: int, chaos: bool) -> d
     ones are only run if these two do not decide. v_average is over ``averaged`` periods; ``chaos``
     tells whether the runs are long enough to show it."""
     two = next(ways), next(ways)
-    repeats = [_repeats(way) for way in two]
+    count, count_aside = (_repeats(way) for way in two)
     own, aside = (_mean(way) / length for way in two)
-    if None in repeats and max(abs(own), abs(aside)) >= LEAST:
-        if not chaos or any(repeats) or relative_error(aside, own) <= PARTED:
+    if None in (count, count_aside) and max(abs(own), abs(aside)) >= LEAST:
+        parted = count is None and count_aside is None and relative_error(aside, own) > PARTED
+        if not (chaos and parted):
             return {"motion": "unsettled"}
         means = np.concatenate([_stretches(way, averaged) for way in (*two, *ways)]) / length
         return {"motion": "chaotic", "v_average_range": [float(means.min()), float(means.max())]}
-    answers: list[float] = []
-    for way in (*two, *ways):
-        answer = _answer(way, length)
-        if answer is None:
-            return {"motion": "unsettled"}
-        if all(relative_error(answer, other) > SAME for other in answers):
-            answers.append(answer)
+    answers = _answers(chain(two, ways), length)
+    if answers is None:
+        return {"motion": "unsettled"}
     if not any(answers):
         return {"motion": "no transport"}
     found: dict[str, Any] = {"motion": "regular"}
     if len(answers) > 1:
         found = {"motion": "several answers", "v_average_answers": answers}
-    if repeats[0] is not None:
-        found["motion_periods"] = repeats[0]
-        found["motion_settled"] = _settled(two[0], repeats[0]) * length
+    if count is not None:
+        found["motion_periods"] = count
+        found["motion_settled"] = _settled(two[0], count) * length
         found["v_average_settled"] = answers[0]
     return found
+
+
+def _answers(ways: Iterable[Array], length: float) -> list[float] | None:
+    """The mean velocities (m/s) that differ, the first start's first; None, and no further start is
+    run, once motion does not repeat."""
+    answers: list[float] = []
+    for way in ways:
+        answer = _answer(way, length)
+        if answer is None:
+            return None
+        if all(relative_error(answer, other) > SAME for other in answers):
+            answers.append(answer)
+    return answers
 
 
 def _answer(way: Array, length: float) -> float | None:

@@ -100,37 +100,49 @@ def summaries(
 
 
 def _batch(scenes: Sequence[Scene], step: float, progress: Progress) -> list[dict[str, Any]]:
-    """The summaries of at most LANES scenes with one step and one shutter. The surface's height is
-    read at the instants of the camera's frames piece by piece; ``left`` (instants × lanes) and
-    ``at`` (instants) hold those that the next frames' accelerations still need."""
+    """The summaries of at most LANES scenes with one step and one shutter."""
     began, runs = time.perf_counter(), _Runs(scenes, step)
-    settle, until, n = runs.settle, runs.until, len(scenes)
-    exposure = scenes[0].run.shutter / FRAME_RATE
-    each = instants_a_frame(exposure)
-    instants = exposures(until.max(), settle.min(), scenes[0].run.shutter)
-    left, at = np.empty((0, LANES)), np.empty(0)
-    seen = np.full((2, n), -np.inf)  # by scene: largest acceleration upwards, and downwards
+    shutter, end = scenes[0].run.shutter, float(runs.until.max())
+    camera = _Camera(shutter / FRAME_RATE, runs.settle, runs.until)
+    instants = exposures(end, runs.settle.min(), shutter)
     for times, heights in runs.go(lambda low, high: instants[_between(instants, low, high)]):
-        left, at = np.concatenate([left, heights]), np.concatenate([at, times])
-        whole = len(at) // each * each
-        frames = at[:whole].reshape(-1, each).mean(axis=1)[:, np.newaxis]
+        camera.see(times, heights)
+        progress(min(runs.reached, end))
+    wall_time = (time.perf_counter() - began) / len(scenes)
+    sums = [dict(zip(_SUMS, lane, strict=True)) for lane in zip(*runs.sums, strict=True)]
+    seen = camera.seen.T.tolist()
+    return [_numbers(scene, sums[k], seen[k], wall_time) for k, scene in enumerate(scenes)]
+
+
+class _Camera:
+    """The largest accelerations that a camera reads of scenes side by side, whose surfaces' heights
+    come piece by piece; ``_heights`` (instants × lanes) and ``_times`` (instants) keep those that
+    the next frames' accelerations still need."""
+
+    def __init__(self, exposure: float, settle: Array, until: Array) -> None:
+        self._exposure, self._settle, self._until = exposure, settle, until
+        self._heights, self._times = np.empty((0, LANES)), np.empty(0)
+        self.seen = np.full((2, len(settle)), -np.inf)
+        """Largest acceleration upwards, and downwards, of each scene, m/s²."""
+
+    def see(self, times: Array, heights: Array) -> None:
+        """Take the surfaces' next heights (m; times × lanes) at the instants ``times`` (s)."""
+        self._heights = np.concatenate([self._heights, heights])
+        self._times = np.concatenate([self._times, times])
+        each = instants_a_frame(self._exposure)
+        whole = len(self._times) // each * each
+        frames = self._times[:whole].reshape(-1, each).mean(axis=1)[:, np.newaxis]
         # An acceleration is a five-point difference: the two frames before and after must lie after
         # settling and before the end, and within what is left here.
-        lost = exposure / 2.0 + 2.0 / FRAME_RATE - 1e-9
-        counts = (frames - lost >= settle) & (frames + lost <= until)
-        read = accelerations(shown(left[:whole, :n], exposure))[2:-2]
-        for row, side in zip(seen, (read, -read), strict=True):
+        lost = self._exposure / 2.0 + 2.0 / FRAME_RATE - 1e-9
+        counts = (frames - lost >= self._settle) & (frames + lost <= self._until)
+        shots = shown(self._heights[:whole, : len(self._settle)], self._exposure)
+        read = accelerations(shots)[2:-2]
+        for row, side in zip(self.seen, (read, -read), strict=True):
             most = np.where(counts[2:-2], side, -np.inf).max(axis=0, initial=-np.inf)
             np.maximum(row, most, out=row)
         first = max(0, whole - 4 * each)
-        left, at = left[first:], at[first:]
-        progress(min(runs.reached, float(until.max())))
-    took = time.perf_counter() - began
-    sums = dict(zip(_SUMS, runs.sums, strict=True))
-    return [
-        _numbers(scene, {name: row[k] for name, row in sums.items()}, seen[:, k].tolist(), took / n)
-        for k, scene in enumerate(scenes)
-    ]
+        self._heights, self._times = self._heights[first:], self._times[first:]
 
 
 def _numbers(

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
-from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
@@ -31,20 +30,11 @@ class Plan:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        sides = {each.name: Side(each, stranger(each.file)) for each in scene.fmu}
-        for side in sides.values():
-            same = [other.name for other in sides.values() if other.of is side.of]
-            if len(same) > 1 and side.of.abilities.canBeInstantiatedOnlyOncePerProcess:
-                raise side.of.bad(
-                    f"[[fmu]] {', '.join(same)} cannot all be of it: it says of itself "
-                    "canBeInstantiatedOnlyOncePerProcess = true"
-                )
         # The machine, treated like any FMU, has no input for its coil's voltage.
         ports = [port for port in scene.port if port.to not in MACHINE_ENDS[3:]]
         ends = [port.origin or port.to or "" for port in ports]
         self._has_machine = any(end.startswith(f"{MACHINE}.") for end in ends)
-        if self._has_machine:
-            sides[MACHINE] = Side(_machine(scene), stranger(str(unpacked(2))))
+        sides = _by_name(scene, self._has_machine)
         self.sides = _in_order(scene, sides)
         """FMUs in the order in which they step: each after those that feed it, where possible."""
         self.probes = tuple(dict.fromkeys(p.probe for p in ports if p.probe is not None))
@@ -69,18 +59,19 @@ class Plan:
             self._join(port, sides)
         # Each FMU's outputs are a part of one row. Reported slopes lengthen the parts, so the
         # places in the whole row are known only now.
-        firsts = [0, *accumulate(side.width for side in self.sides)]
-        for side, first in zip(self.sides, firsts, strict=False):
-            for origin in (origin for of, origin in self._from if of is side):
-                origin.place += first
-                origin.slope_place += first
-        self.width = firsts[-1]
+        self.width = 0
         """Length of the row of all outputs."""
+        for side in self.sides:
+            side.first = self.width
+            self.width += side.width
+        for side, origin in self._from:
+            origin.place += side.first
+            origin.slope_place += side.first
         self.backs = {
             origin.place
-            for side, first in zip(self.sides, firsts, strict=False)
+            for side in self.sides
             for origin in side.origins()
-            if origin.kind == OUTPUT and origin.place >= first
+            if origin.kind == OUTPUT and origin.place >= side.first
         }
         """Places of outputs that feed an FMU which steps before their own FMU."""
         through, circle = self._feedthrough(), _circle(self._needs)
@@ -103,11 +94,10 @@ class Plan:
 
     def outputs(self) -> Iterator[tuple[Side, str, int, bool]]:
         """Each output's FMU, name, place in the row of all, and whether a port reads it."""
-        places, first = {origin.place for _, origin in self._from}, 0
+        places = {origin.place for _, origin in self._from}
         for side in self.sides:
-            for k, (name, *_) in enumerate(side.columns):
-                yield side, name, first + k, first + k in places
-            first += side.width
+            for place, (name, *_) in enumerate(side.columns, side.first):
+                yield side, name, place, place in places
 
     @property
     def driven(self) -> bool:
@@ -143,18 +133,7 @@ class Plan:
 
     def _join(self, port: Port, sides: dict[str, Side]) -> None:
         """Add a port: its origin (probe, drive or output), and what it feeds (source or input)."""
-        origin = Origin(scale=port.scale, offset=port.offset)
-        side, output, given = None, None, "V"
-        if port.probe is not None:
-            origin.kind, origin.place = PROBE, self.words.index(port.probe)
-            given = unit(port.probe)
-        elif port.origin == "drive":
-            origin.kind = DRIVE
-        else:
-            side, output, place = _end(port, "from", str(port.origin), sides, "output")
-            origin.kind, origin.place = OUTPUT, side.places[output.name] + place
-            given = output.unit
-            _set_slope(origin, port, side, output, place)
+        origin, given, side, output = self._origin(port, sides)
         if port.source is not None:
             self.names.append(port.source)
             taken = "V" if port.source[0] in "vV" else "A"
@@ -165,16 +144,7 @@ class Plan:
         else:
             into, variable, place = _end(port, "to", str(port.to), sides, "input")
             taken = variable.unit
-            able = into.of.version == 2 and into.of.abilities.canInterpolateInputs
-            able = able and variable.size == 1
-            if port.feed == "line" and variable.real and not able:
-                raise into.of.bad(
-                    f'[[port]] feed = "line" into {into.name}.{variable.name} needs an FMU of FMI '
-                    '2.0 with canInterpolateInputs; take "mean" or "end"'
-                )
-            kind = port.feed if port.feed != "auto" else "line" if able else "mean"
-            # Integers and truth values have no mean, so they are taken at the end.
-            feed = Feed(origin=origin, feed=_FEEDS[kind if variable.real else "end"])
+            feed = Feed(origin=origin, feed=_FEEDS[_way(port, into, variable)])
             into.feed(variable, place, feed)
             kept = feed.origin
             if side is not None and output is not None:
@@ -188,17 +158,60 @@ class Plan:
             if kept.slope == _KNOWN:
                 self.told.append((side, str(port.origin), kept))
 
+    def _origin(
+        self, port: Port, sides: dict[str, Side]
+    ) -> tuple[Any, str, Side | None, Variable | None]:
+        """What a port reads, as ``ports.c`` takes it, its unit, and the FMU and output it is of."""
+        origin = Origin(scale=port.scale, offset=port.offset)
+        if port.probe is not None:
+            origin.kind, origin.place = PROBE, self.words.index(port.probe)
+            return origin, unit(port.probe), None, None
+        if port.origin == "drive":
+            origin.kind = DRIVE
+            return origin, "V", None, None
+        side, output, place = _end(port, "from", str(port.origin), sides, "output")
+        origin.kind, origin.place = OUTPUT, side.places[output.name] + place
+        _set_slope(origin, port, side, output, place)
+        return origin, output.unit, side, output
+
 
 def _alike(unit: str) -> str:
     """A unit whose products are written in one of the ways that tools have for them."""
     return re.sub(r"[\s.*·]", "", unit)
 
 
-def _machine(scene: Scene) -> Fmu:
-    """The built-in machine as a foreign FMU, with the parameters of the scene's tables."""
-    reals, wholes = parameters(scene)
-    given = {**reals, **wholes, "normal_force": scene.friction.normal_force}
-    return Fmu(name=MACHINE, file=str(unpacked(2)), parameters=given)
+def _by_name(scene: Scene, has_machine: bool) -> dict[str, Side]:
+    """The scene's FMUs by their names; with them, if it ``has_machine``, the built-in machine like
+    a foreign FMU, with the parameters of the scene's tables."""
+    sides = {each.name: Side(each, stranger(each.file)) for each in scene.fmu}
+    for side in sides.values():
+        same = [other.name for other in sides.values() if other.of is side.of]
+        if len(same) > 1 and side.of.abilities.canBeInstantiatedOnlyOncePerProcess:
+            raise side.of.bad(
+                f"[[fmu]] {', '.join(same)} cannot all be of it: it says of itself "
+                "canBeInstantiatedOnlyOncePerProcess = true"
+            )
+    if has_machine:
+        reals, wholes = parameters(scene)
+        given = {**reals, **wholes, "normal_force": scene.friction.normal_force}
+        machine = Fmu(name=MACHINE, file=str(unpacked(2)), parameters=given)
+        sides[MACHINE] = Side(machine, stranger(machine.file))
+    return sides
+
+
+def _way(port: Port, into: Side, variable: Variable) -> str:
+    """How an input is fed over a step: its "mean", a straight "line", or the value at its "end"."""
+    able = into.of.version == 2 and into.of.abilities.canInterpolateInputs and variable.size == 1
+    if not variable.real:
+        return "end"  # integers and truth values have no mean
+    if port.feed == "line" and not able:
+        raise into.of.bad(
+            f'[[port]] feed = "line" into {into.name}.{variable.name} needs an FMU of FMI '
+            '2.0 with canInterpolateInputs; take "mean" or "end"'
+        )
+    if port.feed == "auto":
+        return "line" if able else "mean"
+    return port.feed
 
 
 def _end(

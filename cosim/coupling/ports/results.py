@@ -102,11 +102,9 @@ def _signals(run: Run) -> Iterator[Signal]:
     """Outputs of FMUs from the log ``points`` (time, then the row of all outputs); sources and
     probed values from ``log`` (time, sources, probed values)."""
     points, log = run.points.array(), run.log.array()
-    place = 1
     for side in run.plan.sides:
-        for k, (name, of, goes_on) in enumerate(side.columns):
-            yield name, of, points[:, 0], points[:, place + k], goes_on
-        place += side.width
+        for column, (name, of, goes_on) in enumerate(side.columns, 1 + side.first):
+            yield name, of, points[:, 0], points[:, column], goes_on
     for k, name in enumerate(run.plan.names):
         kind = run.deck.kinds[name.lower()]
         yield name, "V" if kind == "v" else "A", log[:, 0], log[:, 1 + k], True
@@ -196,13 +194,11 @@ def _notes(run: Run, odd: list[str]) -> Iterator[str]:
         yield f"left out, as they are no finite numbers, and nothing reads them: {', '.join(odd)}."
     if names := ", ".join(name for _, name, at, _ in run.plan.outputs() if run.odd[at]):
         yield f"repeated steps change {names}, which the FMU does not restore, so they are off."
-    points, place = run.points.array(), 1
+    points = run.points.array()
     for side in run.plan.sides:
         told = run.plan.method == "macro-steps" and side.of.step > 0.0  # the plan's notes have it
-        own = np.nan_to_num(
-            points[:, [place + k for k, (*_, goes_on) in enumerate(side.columns) if goes_on]]
-        )
-        place += side.width
+        columns = enumerate(side.columns, 1 + side.first)
+        own = np.nan_to_num(points[:, [column for column, (*_, goes_on) in columns if goes_on]])
         changed = np.flatnonzero((own[1:] != own[:-1]).any(axis=1)) + 1
         # The median interval between changes: an output at rest for long says nothing.
         if not told and len(changed) > _MANY and np.median(np.diff(changed)) >= _SELDOM:

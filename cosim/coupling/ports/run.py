@@ -87,10 +87,7 @@ class Run(ngspice.Leader):
         self._blocks.append(np.zeros((_POINTS, 1 + width)))
         repeats = plan.method == "redo"
         rows, saved = (list(map(ctypes.addressof, each)) for each in (self._rows, self._saved))
-        states, row = [], rows[0]
-        for side in plan.sides:
-            states.append(side.state(row, repeats))
-            row += 8 * side.width
+        states = [side.state(rows[0] + 8 * side.first, repeats) for side in plan.sides]
         self.fmus = _array(StrangerState, states)
         for through, feed in plan.throughs:
             through.input = feed.input

@@ -34,6 +34,9 @@ class Side:
         self.slopes: list[Variable] = []
         """Outputs whose derivative the FMU reports; these derivatives follow in the row."""
         self.places = _places(self.outputs)
+        """Place of each output in this FMU's part of the row."""
+        self.first = 0
+        """Place of that part in the row of all outputs; the plan sets it."""
         self.inputs: list[Variable] = []
         self._feeds: list[tuple[Variable, int, Any]] = []
         self._kept: list[Any] = []

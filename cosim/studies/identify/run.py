@@ -9,6 +9,7 @@ from zlib import crc32
 
 import numpy as np
 
+from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.evaluate.evaluator import workers_asked
 from cosim.evaluate.store import Store, reported
@@ -122,8 +123,7 @@ def _identified(
     verdicts = judge(best, meant, errors)
     # Three-fold cross-validation needs a trial in each fold.
     fold_rigs, held_out = _folds(plan, trials) if len(trials) >= 3 else ([], [])
-    unseen = replace(plan.fine, targets=[trial.fine for trial in apart])
-    apart_own = plan.drives("trials apart", best.point, unseen).own if apart else np.empty((0, 0))
+    apart_own, rows_apart = _apart(plan, best, apart)
     rows, checks = solved.told_of_trials(trials, best)
     made_up = solved.errors_on(_made_up(plans[0][0]), trials)
     means = {kind: solved.overall([row[kind] for row in held_out]) for kind in solved.KINDS}
@@ -133,10 +133,7 @@ def _identified(
         "verdicts": [asdict(verdict) for verdict in verdicts],
         "overall": solved.overall(rows),
         "trials": rows,
-        "apart": [
-            solved.errors(trial, best.rig, one) | solved.repeatability(trial) | own_parameters(one)
-            for trial, one in zip(apart, apart_own, strict=True)
-        ],
+        "apart": rows_apart,
         "held_out": held_out,
         "held_out_overall": means if held_out else None,
         "made_up_rig": {"overall": solved.overall(made_up), "trials": made_up},
@@ -168,6 +165,19 @@ def _asked(space: Space, trials: Sequence[Measured], effort: object) -> list[Any
         [one.label, *(crc32(x.tobytes()) for x in one.target.signals.values())] for one in trials
     ]
     return [entries, space.laws, space.measured, signals, repr((effort, WEIGHTS))]
+
+
+def _apart(plan: Plan, best: Found, apart: list[Measured]) -> tuple[Array, list[Row]]:
+    """The trials apart on the best rig: their own parameters, fitted (trials × parameters), and
+    their errors."""
+    if not apart:
+        return np.empty((0, 0)), []
+    unseen = replace(plan.fine, targets=[trial.fine for trial in apart])
+    owns = plan.drives("trials apart", best.point, unseen).own
+    return owns, [
+        solved.errors(trial, best.rig, own) | solved.repeatability(trial) | own_parameters(own)
+        for trial, own in zip(apart, owns, strict=True)
+    ]
 
 
 def _folds(plan: Plan, trials: Sequence[Measured]) -> tuple[list[Found], list[Row]]:
