@@ -23,6 +23,7 @@ from cosim.errors import BadInput, CosimError, SimulationFailed
 from cosim.files.resources import circuits
 from cosim.scene import load
 from cosim.simulation import elsewhere
+from cosim.simulation.rungs.spice import _refuse_foreign_coil
 from cosim.simulation.simulate import simulate
 from cosim.toolchain import processes
 from tests.helpers import needs
@@ -143,6 +144,20 @@ def test_steps_shorter_than_the_times_digits_tell_nothing_of_the_coil(home: Path
     path.write_text(JUMPING.replace("{coil_inductance/count}", "1.3m"), encoding="utf-8")
     with pytest.raises(BadInput, match=r"1\.3 mH, .* 1\.2 mH"):
         simulate(load("paper-limited", changes))
+
+
+def test_noise_of_short_steps_tells_nothing_of_the_coil() -> None:
+    """Behind each edge of a PWM ngspice takes steps of 1e-11 s, in which a current has an error of
+    1e-6: its sum over steps is right, that of its squares is not."""
+    length = np.tile([*[1e-11] * 300, 1e-6, 1e-6], 500)
+    time = np.append(0.0, np.cumsum(length))
+    current, slope = 0.01 * np.sin(6e3 * time), 60.0 * np.cos(6e3 * time)
+    log = {"time": time, "v(out)": 7.1 * current + 1.2e-3 * slope}
+    current[1:] += (length < 1e-10) * np.random.default_rng(0).normal(0, 1e-6, len(length))
+    log |= {"i(vemf)": current, "v(sense)": 0.0 * time, "emf": 0.0 * time}
+    _refuse_foreign_coil(load("reference", []), log)
+    with pytest.raises(BadInput, match=r"1\.2 mH, .* 1\.3 mH"):
+        _refuse_foreign_coil(load("reference", ["coil.inductance=1.3e-3"]), log)
 
 
 @pytest.mark.parametrize("name", SIMULATIONS)

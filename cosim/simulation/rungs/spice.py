@@ -172,11 +172,6 @@ def _points(log: dict[str, Array], lead: int = 0) -> Iterator[dict[str, Array]]:
         yield {name: np.ascontiguousarray(values[reach]) for name, values in log.items()}
 
 
-DIGITS = 1e5
-"""Times that with which the time is told: of a shorter step, as they follow an edge within a step,
-the length is rounded and with it the current that ngspice finds."""
-
-
 def _refuse_foreign_coil(scene: Scene, log: dict[str, Array]) -> None:
     """Refuse a netlist whose voltage between ``out`` and ``sense`` is not that of the scene's coil.
 
@@ -225,13 +220,15 @@ def _refuse_foreign_coil(scene: Scene, log: dict[str, Array]) -> None:
 
 
 def _fluxes(scene: Scene, log: dict[str, Array]) -> Iterator[tuple[Array, Array, Array]]:
-    """For the steps of each part of the log: the integral of one coil's current (A s) and its
-    change (A) as two rows; the integral of its voltage less the back-EMF (V s); the sum of the
-    magnitudes of these two integrals (V s)."""
+    """For the steps of each part of the log, short ones together with the next long one, since
+    ngspice's current is noisy in them: the integral of one coil's current (A s) and its change (A)
+    as two rows; the integral of its voltage less the back-EMF (V s); the sum of the magnitudes of
+    these two integrals (V s)."""
     for part in _points(log):
         current, h = part["i(vemf)"] / scene.coil.count, np.diff(part["time"])
         voltage, emf = part["v(out)"] - part["v(sense)"], part["emf"]
         charge, given, back = (0.5 * (x[1:] + x[:-1]) * h for x in (current, voltage, emf))
-        known = h > DIGITS * np.spacing(part["time"][1:])
         slopes, whole = np.stack([charge, np.diff(current)]), np.abs(given) + np.abs(back)
-        yield slopes[:, known], (given - back)[known], whole[known]
+        firsts = np.flatnonzero(np.append(True, h[:-1] > 0.1 * h.mean()))
+        found = (np.add.reduceat(x, firsts, axis=-1) for x in (slopes, given - back, whole))
+        yield next(found), next(found), next(found)
