@@ -7,10 +7,10 @@ total time; loky loses all calls with one process. Here a worker imports its fun
 is ended when it makes no progress. That is measured in CPU time and in time awake, not by the wall
 clock: a machine that slept, or a process that was stopped, has lost nothing.
 
-A worker has a working folder of its own, only those environment variables that its libraries need,
-and runs in a fence with :class:`Bounds`. Workers of equal bounds are reused. Untrusted code may run
-in one and answer in its name, so its messages are JSON, never a pickle, which could call anything
-here.
+A worker has a working folder of its own, and only those environment variables that its libraries
+need; with :class:`Bounds` it runs in a fence. Workers of equal bounds are reused. Untrusted code
+may run in a bounded worker and answer in its name, so its messages are JSON, never a pickle, which
+could call anything here.
 """
 
 import builtins
@@ -28,6 +28,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -59,7 +60,7 @@ CALLS = 250
 """Calls after which a process is replaced: so ngspice's memory leaks stay below some MB."""
 
 MOST_SAID = 64 << 20
-"""Most bytes of one message from a process: waveforms are in a file, not in messages."""
+"""Most bytes of one message from a bounded process: waveforms are in a file, not in messages."""
 
 _PACKED = "__columns__"
 """The only key of a JSON object that stands for columns in a file."""
@@ -138,15 +139,18 @@ class Worker:
     process ends with its parent.
     """
 
-    def __init__(self, function: Callable[[Any, Progress], Any], bounds: Bounds) -> None:
+    def __init__(
+        self, function: Callable[[Any, Progress], Any], bounds: Bounds | None = None
+    ) -> None:
         self.pipe, there = Pipe()
+        inside = bounds.inside if bounds else None
         self.kind = function, bounds
-        self.folder, lock = folder_of_ones_own(bounds.inside or Path(tempfile.gettempdir()))
+        self.folder, lock = folder_of_ones_own(inside or Path(tempfile.gettempdir()))
         held: list[subprocess.Popen[Any]] = []
         self._remains = finalize(self, _clear, os.getpid(), held, self.folder)
         _living[id(self)] = ref(self)
         try:
-            self._process = _start(there, self.folder, lock, bounds.library)
+            self._process = _start(there, self.folder, lock, bounds.library if bounds else "")
         finally:
             there.close()
             os.close(lock)
@@ -215,6 +219,8 @@ class Worker:
     def _heard(self) -> tuple[str, Any]:
         """The next message: its kind and value. Raises EOFError where the process has died, OSError
         also for a senseless message."""
+        if self.kind[1] is None:
+            return self.pipe.recv()
         try:
             kind, value = json.loads(self.pipe.recv_bytes(MOST_SAID), object_hook=self._columns)
             if kind in ("progress", "spent"):
@@ -312,7 +318,7 @@ def in_a_worker() -> bool:
 
 
 def _error(name: str, text: str) -> Exception:
-    """An exception of a worker: one of this package or of Python, by its name."""
+    """An exception of a bounded process: one of this package or of Python, by its name."""
     ours = (BadInput, Refused, SimulationFailed, StepTooSmall)
     kind: Any = (vars(builtins) | {one.__name__: one for one in ours}).get(name)
     with suppress(TypeError):  # no class, or an exception that takes more than a text
@@ -336,12 +342,12 @@ def isolated(
     function: Callable[[Any, Progress], Any],
     argument: Any,
     progress: Progress,
-    bounds: Bounds,
+    bounds: Bounds | None = None,
     lost: Callable[[str], None] = lambda _: None,
 ) -> Any:
-    """The result of ``function(argument, progress)`` in another process, which is reused; it must
-    fit in JSON, :class:`Packed` columns aside. At most as many processes as processors work at
-    once.
+    """The result of ``function(argument, progress)`` in another process: a fresh one, or, with
+    ``bounds``, one that is reused, where the result must fit in JSON, :class:`Packed` columns
+    aside. At most as many processes as processors work at once.
 
     Any thread may call it. Raises what the function raises, or SimulationFailed where the process
     hangs or dies; if that happens after its answer, ``lost`` is called with how it ended.
@@ -368,7 +374,7 @@ def isolated(
                     words = f"The simulation's process {what} ({how})."
                     raise ProcessLost(words) from None
             finally:
-                if worker.usable:
+                if worker.usable and bounds is not None:
                     _idle[worker.kind].append(worker)
                     _thin_out()
                 else:
@@ -394,10 +400,10 @@ def _place(heed: Callable[[], None]) -> Iterator[None]:
         _places.release()
 
 
-def _taken(function: Callable[[Any, Progress], Any], bounds: Bounds) -> Worker:
+def _taken(function: Callable[[Any, Progress], Any], bounds: Bounds | None) -> Worker:
     """An idle process that is still alive, or a new one."""
     with suppress(IndexError):
-        while True:
+        while bounds is not None:
             worker = _idle[function, bounds].pop()
             if worker.alive:
                 return worker
@@ -459,14 +465,15 @@ def serve(pipe: Connection) -> None:
     """The worker's main loop until its parent ends: call the function, and send the answers."""
     function, bounds = pipe.recv(), pipe.recv()
     unfit: Exception | None = None
-    try:
-        if bounds.first is not None:
-            bounds.first()
-        fence.close(bounds.reads)  # before there are threads, which would stay outside
-    except Exception as failure:
-        unfit = failure
+    if bounds is not None:
+        try:
+            if bounds.first is not None:
+                bounds.first()
+            fence.close(bounds.reads)  # before there are threads, which would stay outside
+        except Exception as failure:
+            unfit = failure
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    reports = _Reports(pipe)
+    reports = _Reports(pipe.send if bounds is None else partial(_send_json, pipe))
     while True:
         try:
             argument = pipe.recv()
@@ -479,7 +486,8 @@ def serve(pipe: Connection) -> None:
             with in_place():
                 answer = ("result", function(argument, reports.progress))
         except Exception as failure:
-            answer = ("failure", (type(failure).__name__, str(failure)))
+            told = (type(failure).__name__, str(failure))
+            answer = ("failure", failure if bounds is None else told)
         if _retires:
             reports.send("retires", None)
         reports.send(*answer)
@@ -510,8 +518,8 @@ def retire() -> None:
 class _Reports:
     """Reports to the parent: progress, and the CPU time used since the last progress."""
 
-    def __init__(self, pipe: Connection) -> None:
-        self._pipe = pipe
+    def __init__(self, tell: Callable[[tuple[str, Any]], None]) -> None:
+        self._tell = tell
         self._alone = threading.Lock()
         self._told = time.monotonic()
         self._steps = 0
@@ -519,9 +527,8 @@ class _Reports:
         threading.Thread(target=self._beat, daemon=True).start()
 
     def send(self, kind: str, value: Any) -> None:
-        said = json.dumps((kind, value), default=_packed).encode()
         with self._alone:
-            self._pipe.send_bytes(said)
+            self._tell((kind, value))
 
     def begin(self) -> None:
         """A call begins; its first progress is sent at once."""
@@ -551,10 +558,14 @@ class _Reports:
                         self.send("spent", spent)
 
 
+def _send_json(pipe: Connection, said: tuple[str, Any]) -> None:
+    pipe.send_bytes(json.dumps(said, default=_packed).encode())
+
+
 def _packed(value: Any) -> dict[str, Any]:
     if isinstance(value, Packed):
         return {_PACKED: value.told}
-    raise TypeError(f"a worker cannot give a {type(value).__name__}")
+    raise TypeError(f"a bounded process cannot give a {type(value).__name__}")
 
 
 def _end_with_parent() -> None:
