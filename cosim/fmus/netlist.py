@@ -37,7 +37,7 @@ def netlist(
     made = deck(path, inputs, outputs, {}, 1.0, reltol, max_step, False, {}, called)
     kinds = {name: made.kinds[name.lower()] for name in inputs}
     vectors = dict(zip(outputs, made.vectors, strict=False))  # those of .meas follow
-    write(made.text, kinds, vectors, target, max_step, version, made.pulses)
+    write(made.text, kinds, vectors, target, max_step, version, made.edges.pulses)
 
 
 def write(

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from cosim.circuit.false_cycles import BURST, burst_ends, swings
+from cosim.circuit.joined import Edges
 from cosim.coupling.loop import lead
 from cosim.errors import SimulationFailed
 from cosim.scene import Scene, load
@@ -59,10 +60,10 @@ def scene(case: tuple, reltol: float) -> Scene:
 def trapezoidal(monkeypatch: pytest.MonkeyPatch) -> None:
     original = lead.prepare
 
-    def prepare(scene: Scene) -> tuple[str, dict[str, str]]:
-        deck, saved = original(scene)
+    def prepare(scene: Scene) -> tuple[str, dict[str, str], Edges]:
+        deck, saved, edges = original(scene)
         assert "method=gear" in deck
-        return deck.replace("method=gear", "method=trap"), saved
+        return deck.replace("method=gear", "method=trap"), saved, edges
 
     begin = lead.Lead.begin
 

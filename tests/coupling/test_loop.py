@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cosim.circuit.joined import Edges
 from cosim.coupling.loop import lead, recorder
 from cosim.coupling.loop.structures import (
     Fmu,
@@ -226,9 +227,9 @@ def test_python_fails_below_ngspice(
 def test_a_source_that_nothing_feeds(monkeypatch: pytest.MonkeyPatch) -> None:
     original = lead.prepare
 
-    def strange(scene: Scene) -> tuple[str, dict[str, str]]:
-        deck, saved = original(scene)
-        return deck.replace("\n.tran", "\nVodd odd 0 external\nRodd odd 0 1\n.tran"), saved
+    def strange(scene: Scene) -> tuple[str, dict[str, str], Edges]:
+        deck, saved, edges = original(scene)
+        return deck.replace("\n.tran", "\nVodd odd 0 external\nRodd odd 0 1\n.tran"), saved, edges
 
     monkeypatch.setattr(lead, "prepare", strange)
     with pytest.raises(SimulationFailed, match="external source vodd that nothing feeds"):

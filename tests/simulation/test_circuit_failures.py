@@ -261,8 +261,8 @@ def test_early_end_is_no_result(monkeypatch: pytest.MonkeyPatch, before: np.ndar
     original = lead.prepare
 
     def shortened(scene: object) -> object:
-        deck, saved = original(scene)  # pyright: ignore[reportArgumentType]
-        return deck.replace(" 0.01 0 ", " 0.004 0 "), saved
+        deck, saved, edges = original(scene)  # pyright: ignore[reportArgumentType]
+        return deck.replace(" 0.01 0 ", " 0.004 0 "), saved, edges
 
     monkeypatch.setattr(lead, "prepare", shortened)
     told = r"stopped at t = 0\.004 s of 0\.01 s"
