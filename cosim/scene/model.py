@@ -112,7 +112,7 @@ class Scene(BaseModel):
     run: Run = Run()
     fmu: list[Fmu] = Field(default_factory=list, max_length=64)
     port: list[Port] = Field(default_factory=list, max_length=1024)
-    _origin: Origin = PrivateAttr(Origin())
+    _origin: Origin = PrivateAttr(default_factory=Origin)
 
     @model_validator(mode="before")
     @classmethod

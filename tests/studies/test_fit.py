@@ -162,9 +162,9 @@ def test_trials_that_nobody_published(trials: Path, tmp_path: Path):
 def test_options_that_do_not_exist(trials: Path):
     with pytest.raises(BadInput, match="µ_k of their own"):
         fit(trials, evaluate="published", plate=False)
-    with pytest.raises(BadInput, match="can be evaluated"):
+    with pytest.raises(BadInput, match='evaluate = "mine" must be "published" or None'):
         fit(trials, evaluate="mine")  # pyright: ignore[reportArgumentType]
-    with pytest.raises(BadInput, match="exact or published"):
+    with pytest.raises(BadInput, match='solver = "other" must be "exact" or "published"'):
         fit(trials, solver="other")  # pyright: ignore[reportArgumentType]
 
 

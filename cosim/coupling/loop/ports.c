@@ -284,8 +284,9 @@ static int step_once(Ports *c, double time)
     return 1;
 }
 
-/* By the secant: what a value that was changed by `more` is `off` now, and was `before`. What follows
-   a change within the tolerance, or as small beside it, is another value's doing. */
+/* How far off a value comes per change of what was taken for it, by the secant: `more` was added, it
+   was off by `before` and is by `off`. A change within the tolerance, or as small beside `off`, is
+   rounding: what followed it is another value's doing. */
 static double response(double known, double more, double off, double before, double within,
                        double tolerance)
 {

@@ -93,10 +93,6 @@ def fit(
     have their units, means of these over the trials, and the coefficients of friction.
     """
     folder = Path(trials)
-    if evaluate not in (None, "published"):
-        raise BadInput(f"Only “published” parameters can be evaluated, not “{evaluate}”.")
-    if solver not in ("exact", "published"):
-        raise BadInput(f"The solver is exact or published, not “{solver}”.")
     if evaluate:
         forces = "published" if forces is None else forces
     elif solver != "exact":
