@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 
 import cosim
 from cosim.cli.main import main
+from cosim.errors import BeyondModel
 
 REPOSITORY = Path(__file__).parents[1]
 OWN = {
@@ -205,6 +206,13 @@ def test_a_wrong_type_is_told_in_one_sentence(name: str, given: dict[str, Any], 
     with pytest.raises(cosim.BadInput) as caught:
         getattr(cosim, name)(**given)
     assert words in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_note_is_told_with_the_line_of_the_caller() -> None:
+    """Behind the check of its arguments, which is a call between."""
+    with pytest.warns(BeyondModel) as told:
+        cosim.run("paper-limited", {"drive.amplitude": 9.0, "run.duration": 0.2})
+    assert {each.filename for each in told} == {__file__}
 
 
 def test_a_folder_that_is_none() -> None:

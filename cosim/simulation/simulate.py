@@ -47,7 +47,7 @@ def run(
     """
     result = simulate(load(scene, overrides), progress, checks="strict" if strict else "usual")
     for sentence in result.summary["notes"]:
-        warnings.warn(sentence, BeyondModel, stacklevel=2)
+        warnings.warn(sentence, BeyondModel, stacklevel=3)
     return result
 
 

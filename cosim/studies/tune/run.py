@@ -153,7 +153,7 @@ def tune(
             except SimulationFailed as error:
                 if name == [*families][-1] and not tunings:
                     raise
-                warnings.warn(f"{name}: {error}", Note, stacklevel=2)
+                warnings.warn(f"{name}: {error}", Note, stacklevel=3)
                 continue
             except KeyboardInterrupt:
                 if out is not None:
