@@ -65,8 +65,8 @@ def refuse_unknown(scene: Scene, names: Iterable[str]) -> None:
     from cosim.toolchain.processes import isolated
 
     refuse_missing(scene)
-    scene = changed(scene, dict.fromkeys(own, 0.0), "--over")
-    scene = scene.of(scene.origin, dict.fromkeys(own, "--over"))
+    given = dict.fromkeys(own, "--over")
+    scene = changed(scene, dict.fromkeys(own, 0.0), "--over").of(scene.origin, given)
     if scene.circuit.param and not scene.rung.ngspice:
         raise BadInput(
             f'--over {own[0]}: moves nothing with circuit.model = "{scene.circuit.model}", whose '

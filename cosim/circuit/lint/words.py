@@ -1,6 +1,7 @@
 """The words of a netlist's line: brackets, assignments and definitions, as ngspice splits them."""
 
 import re
+from functools import cache
 
 _ASSIGNED = re.compile(r"\s*(?<![<>=!])=(?!=)\s*")  # "=", but no comparison
 _DEFINITION = re.compile(r"(?<!\w)([a-z_]\w*)\s*(\([^()]*\))?\s*=(?!=)\s*")
@@ -14,6 +15,7 @@ _FACTORS = {"t": 1e12, "g": 1e9, "meg": 1e6, "k": 1e3, "mil": 25.4e-6, "m": 1e-3
 """1A is an ampere: "a" for atto exists only in later versions of ngspice."""
 
 
+@cache
 def word_set(text: str) -> frozenset[str]:
     return frozenset(text.split())
 

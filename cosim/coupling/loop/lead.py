@@ -23,6 +23,7 @@ from cosim.coupling.loop.structures import (
     LeadState,
     Pulse,
     address,
+    array,
     callback,
 )
 from cosim.drive.pieces import Ahead, Command
@@ -128,7 +129,7 @@ class Lead(ngspice.Leader):
 
     def loaded(self, engine: ngspice.Engine) -> None:
         """Pass on the corners of PULSE sources."""
-        self._pulses = told_of(self.state.pulses, engine, self._edges, self._duration)
+        self._pulses = pass_corners(self.state.pulses, engine, self._edges, self._duration)
 
     @property
     def steps(self) -> int:
@@ -160,12 +161,12 @@ class Lead(ngspice.Leader):
         self._recorder.tell()
 
 
-def told_of(pulses: Any, engine: ngspice.Engine, edges: Edges, duration: float) -> Any:
-    """Fill the structure ``pulses`` with the corners of a run's PULSE sources; the array to keep
-    alive as long."""
+def pass_corners(pulses: Any, engine: ngspice.Engine, edges: Edges, duration: float) -> Any:
+    """Fill the structure ``pulses`` with the corners of a run's PULSE sources, and give the array
+    that must live as long as it does."""
     found = (engine.ask(f"@{name}[pulse]") for name in edges.pulses)
     each = [_pulse(values, duration, edges.length) for values in found if len(values) > 2]
-    kept = (Pulse * max(len(each), 1))(*each)
+    kept = array(Pulse, each)
     pulses.all, pulses.n, pulses.duration = ctypes.addressof(kept), len(each), duration
     pulses.announce = engine.address("ngSpice_SetBkpt")
     return kept

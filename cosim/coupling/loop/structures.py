@@ -1,6 +1,6 @@
 """The structures and functions of ``loop.h``, which says what they hold."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from ctypes import CDLL, c_void_p, cast
 from typing import Any
 from weakref import WeakMethod
@@ -49,3 +49,8 @@ def loop() -> CDLL:
 def address(name: str) -> int:
     """Where a function of the compiled loop lies."""
     return cast(getattr(loop(), name), c_void_p).value or 0
+
+
+def array(kind: Any, values: Sequence[Any] = (), length: int = 0) -> Any:
+    """A C array of values, or of zeros; it has one element at least, as C knows no empty array."""
+    return (kind * max(len(values), length, 1))(*values)

@@ -1,15 +1,14 @@
 """One run of a circuit that ngspice leads, joined to FMUs; the steps are those of ``ports.c``."""
 
 import ctypes
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from ctypes import c_char_p, c_double, c_int64
 from functools import partial
-from typing import Any
 
 import numpy as np
 
 from cosim.circuit import ngspice
-from cosim.coupling.loop.lead import after_jump, engine, finished, told_of
+from cosim.coupling.loop.lead import after_jump, engine, finished, pass_corners
 from cosim.coupling.loop.structures import (
     FMU_FAILED,
     NO_AGREEMENT,
@@ -19,6 +18,7 @@ from cosim.coupling.loop.structures import (
     Source,
     StrangerState,
     Through,
+    array,
     callback,
 )
 from cosim.coupling.ports.plan import Plan
@@ -74,11 +74,11 @@ class Run(ngspice.Leader):
         self.deck = plan.deck()
         self._failure: BaseException | None = None
         count, width = len(self.deck.vectors), plan.width
-        self.places = _array(c_int64, length=count + 1)
-        self._rows = [_array(c_double, length=width) for _ in range(3)]
-        self._saved = [_array(c_double, length=count) for _ in range(4)]
-        self._sources = _array(Source, plan.sources)
-        self._asked = _array(c_char_p, [each.encode() or None for each in self.deck.devices])
+        self.places = array(c_int64, length=count + 1)
+        self._rows = [array(c_double, length=width) for _ in range(3)]
+        self._saved = [array(c_double, length=count) for _ in range(4)]
+        self._sources = array(Source, plan.sources)
+        self._asked = array(c_char_p, [each.encode() or None for each in self.deck.devices])
         self.log = Tape(1 + len(plan.sources) + count)
         """Time (s), each source and each saved value at the accepted points."""
         self.points = Tape(1 + width)
@@ -88,17 +88,17 @@ class Run(ngspice.Leader):
         repeats = plan.method == "redo"
         rows, saved = (list(map(ctypes.addressof, each)) for each in (self._rows, self._saved))
         states = [side.state(rows[0] + 8 * side.first, repeats) for side in plan.sides]
-        self.fmus = _array(StrangerState, states)
+        self.fmus = array(StrangerState, states)
         for through, feed in plan.throughs:
             through.input = feed.input
-        self._throughs = _array(Through, [through for through, _ in plan.throughs])
-        self.odd = _array(c_double, length=2 * width)
+        self._throughs = array(Through, [through for through, _ in plan.throughs])
+        self.odd = array(c_double, length=2 * width)
         """For each output: not 0 if a repeated step gave another value; then working space."""
-        self._backs = _array(Back, length=width)
+        self._backs = array(Back, length=width)
         for place in plan.backs:
             self._backs[place].is_one = 1
         slopes = [Slope(place=of.place, slope=of.slope_place) for *_, of in plan.told]
-        self._slopes = _array(Slope, slopes)
+        self._slopes = array(Slope, slopes)
         macro = scene.coupling.macro_step if plan.method == "macro-steps" else 0.0
         self.state = PortsState(
             fmus=ctypes.addressof(self.fmus),
@@ -206,7 +206,7 @@ class Run(ngspice.Leader):
         state.command = engine.address("ngSpice_Command")
         state.ask = engine.address("ngGet_Vec_Info")
         state.plot = engine.address("ngSpice_CurPlot")
-        self._pulses = told_of(state.pulses, engine, self.deck.edges, self._scene.run.duration)
+        self._pulses = pass_corners(state.pulses, engine, self.deck.edges, self._scene.run.duration)
 
     def _attend(self) -> None:
         """Take the logs away."""
@@ -229,8 +229,3 @@ class Run(ngspice.Leader):
                 f"{duration:g} s. A node may ring undamped; where coupling.method is "
                 '"redo", an FMU\'s outputs may jump without end.'
             )
-
-
-def _array(kind: Any, values: Sequence[Any] = (), length: int = 0) -> Any:
-    """A C array of values, or of zeros; it has one element at least, as C knows no empty array."""
-    return (kind * max(len(values), length, 1))(*values)

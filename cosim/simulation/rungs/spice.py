@@ -230,5 +230,6 @@ def _fluxes(scene: Scene, log: dict[str, Array]) -> Iterator[tuple[Array, Array,
         charge, given, back = (0.5 * (x[1:] + x[:-1]) * h for x in (current, voltage, emf))
         slopes, whole = np.stack([charge, np.diff(current)]), np.abs(given) + np.abs(back)
         firsts = np.flatnonzero(np.append(True, h[:-1] > 0.1 * h.mean()))
-        found = (np.add.reduceat(x, firsts, axis=-1) for x in (slopes, given - back, whole))
-        yield next(found), next(found), next(found)
+        each = slopes, given - back, whole
+        slopes, flux, whole = (np.add.reduceat(x, firsts, axis=-1) for x in each)
+        yield slopes, flux, whole
