@@ -15,6 +15,7 @@ from scipy.spatial import KDTree
 
 from cosim.arrays import Array
 from cosim.search.known import Feasible, apart
+from cosim.toolchain.interrupts import deferred
 
 if TYPE_CHECKING:
     from cmaes import CMA
@@ -42,7 +43,8 @@ class Design:
     def __init__(self, keys: int, count: int, seed: int | list[int], ends: bool = False) -> None:
         from scipy.stats import qmc
 
-        self._sequence = qmc.Sobol(keys, rng=np.random.default_rng(seed))
+        with deferred():  # the first reads a table, and would keep half of one
+            self._sequence = qmc.Sobol(keys, rng=np.random.default_rng(seed))
         self._count, self._ends = count, ends
         # A Sobol sequence is balanced in batches whose size is a power of two.
         self._batch = 1 << (max(count // 4, 1).bit_length() - 1)

@@ -27,9 +27,9 @@ def ended_alike() -> Iterator[None]:
     """Within this context all of SIGNALS raise KeyboardInterrupt, except those that were set to be
     ignored when this process started, as nohup does.
 
-    Python ignores exceptions raised while it frees an object, so a signal there is raised again.
-    Without free memory a signal may still be lost, or the cleanup hang: after GRACE the system ends
-    the process.
+    Python ignores exceptions raised while it frees an object, and compiled code those in functions
+    that cannot raise (Cython first prints them), so a signal there is raised again. Without free
+    memory a signal may still be lost, or the cleanup hang: after GRACE the system ends the process.
     """
     alarm = getattr(signal, "alarm", lambda seconds: None)
     armed = False
@@ -46,13 +46,18 @@ def ended_alike() -> Iterator[None]:
         else:
             hook(what)
 
+    def printed(kind: type[BaseException], *rest: Any) -> None:
+        if not issubclass(kind, KeyboardInterrupt):
+            show(kind, *rest)
+
     hook, sys.unraisablehook = sys.unraisablehook, ignored
+    show, sys.excepthook = sys.excepthook, printed
     known = (signal.SIG_DFL, signal.default_int_handler)
     try:
         with _handled(lambda before: interrupt if before in known else None):
             yield
     finally:
-        sys.unraisablehook = hook
+        sys.unraisablehook, sys.excepthook = hook, show
         if armed:
             alarm(0)
 

@@ -39,6 +39,23 @@ except KeyboardInterrupt:
     print("ended")
 """
 
+COMPILED = """
+import time
+import numpy
+from scipy.stats import qmc
+from cosim.toolchain import interrupts
+def load(*_):  # called by a Cython function that cannot raise: it prints what is raised here
+    print("ready", flush=True)
+    time.sleep(60.0)
+numpy.load = load
+try:
+    with interrupts.ended_alike():
+        qmc.Sobol(2)
+        time.sleep(60.0)
+except KeyboardInterrupt:
+    print("ended")
+"""
+
 POLITE = """
 import signal, time
 from cosim.toolchain import interrupts
@@ -60,7 +77,7 @@ def heed_all() -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
-@pytest.mark.parametrize("program", [DEAF, FREEING, POLITE])
+@pytest.mark.parametrize("program", [DEAF, FREEING, COMPILED, POLITE])
 def test_a_signal_ends_a_command_that_does_not_hear_it(program: str, number: int) -> None:
     process = subprocess.Popen(
         [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
