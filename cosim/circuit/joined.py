@@ -9,12 +9,14 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence, S
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from cosim.circuit.dialect.lines import Line, refuse
+from cosim.circuit.dialect.words import definitions, number
+from cosim.circuit.lint.allowed import passed
 from cosim.circuit.lint.checks import check
-from cosim.circuit.lint.deck import Line, passed, read, refuse
+from cosim.circuit.lint.deck import read
 from cosim.circuit.lint.elements import Element, Scope, node, parse
 from cosim.circuit.lint.expressions import sensed
 from cosim.circuit.lint.topology import Expansion
-from cosim.circuit.lint.words import definitions, number
 from cosim.circuit.lint.write import written
 from cosim.circuit.outputs import Measure, measures, without_effect
 from cosim.errors import BadInput, plain

@@ -11,9 +11,10 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+from cosim.circuit.dialect.lines import Line, refuse
 from cosim.circuit.joined import Checked, Edges, checked, own_parameters, reading
 from cosim.circuit.lint.checks import REQUIRED as AGREED
-from cosim.circuit.lint.deck import Line, read, refuse
+from cosim.circuit.lint.deck import read
 from cosim.circuit.outputs import Measure, measures, without_effect
 from cosim.files.resources import circuits
 from cosim.scene import Scene

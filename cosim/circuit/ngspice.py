@@ -21,8 +21,8 @@ from typing import Any, ClassVar
 
 from PySpice.Spice.NgSpice import Shared
 
+from cosim.circuit.dialect.words import sent
 from cosim.circuit.joined import drawn
-from cosim.circuit.lint.words import sent
 from cosim.errors import BadInput, SimulationFailed, plain
 from cosim.toolchain.libraries import library, ngspice_library
 from cosim.toolchain.processes import retire
@@ -84,8 +84,8 @@ def engine(data: int, source: int, step: int) -> "Engine":
     GetVSRCData, GetSyncData; in Python these would take longer than ngspice itself. Raises BadInput
     where the library is missing.
 
-    It loads no code models: ``lint/dialect.py`` does without them, and they would cost 5 % of each
-    run, since every step visits all kinds of elements.
+    It loads no code models: ``dialect`` does without them, and they would cost 5 % of each run,
+    since every step visits all kinds of elements.
     """
     name = ngspice_library()
     os.environ["SPICE_SCRIPTS"] = os.curdir  # not the installed spinit, which loads code models

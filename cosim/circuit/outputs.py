@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.circuit.lint.lines import Line, refuse, shown
-from cosim.circuit.lint.words import NUMBER, number, word_set
+from cosim.circuit.dialect.lines import Line, refuse, shown
+from cosim.circuit.dialect.words import NUMBER, number, word_set
 
 _SAVING = word_set(".save .probe .probe64 .plot .print .wave")
 _ANALYSES = word_set(".op .ac .dc .tf .noise .disto .pz .sens .sp .four .fourier .csparam")

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from math import inf
 from pathlib import Path
 
+from cosim.circuit.dialect.words import number, sent
 from cosim.circuit.joined import deck, unit
-from cosim.circuit.lint.words import number, sent
 from cosim.errors import BadInput, plain
 from cosim.fmus.pack import pack
 from cosim.toolchain.libraries import SUFFIX, compiled

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cosim.circuit.dialect.lines import Line
 from cosim.circuit.lint.checks import check
-from cosim.circuit.lint.deck import Line
 from cosim.circuit.lint.expressions import BEHAVIOURAL, PARAMETRIC
 from cosim.circuit.lint.write import written
 from cosim.errors import BadInput, plain

@@ -2,9 +2,10 @@
 
 from pathlib import Path
 
+from cosim.circuit.dialect.lines import Line
 from cosim.circuit.lint import deck
 
 
-def read(path: Path) -> list[deck.Line]:
+def read(path: Path) -> list[Line]:
     """The lines that ngspice needs, the title first."""
     return deck.read(path)[0]

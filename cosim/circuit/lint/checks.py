@@ -7,11 +7,11 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise, takewhile
 
+from cosim.circuit.dialect.lines import Line, refuse, shown
+from cosim.circuit.dialect.words import closing, number, unbraced, word_set
 from cosim.circuit.lint.elements import KINDS, Element, Scope, parse
 from cosim.circuit.lint.expressions import Names, body, check_circles, check_names, sensed
-from cosim.circuit.lint.lines import Line, refuse, shown
 from cosim.circuit.lint.topology import check_topology
-from cosim.circuit.lint.words import closing, number, unbraced, word_set
 
 REQUIRED = (("vemf", "vcommand"), ("vemf", "vdac", "voffset"))
 """Alternatives, each a set of top-level voltage sources that a co-simulation can replace."""

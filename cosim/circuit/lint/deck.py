@@ -1,9 +1,7 @@
 """Reads a netlist for ngspice; no other code passes a file's text to it.
 
-A netlist can run commands, write files and read files while ngspice merely loads it: ``.control``,
-``*#`` comments, a ``*ng_script`` title, code models, several device models and options. So this is
-a list of what is allowed: files are read and joined here, and only lines, words and characters that
-a circuit needs pass. ngspice sees neither comments nor file names.
+Files are read and joined here, and only what ``allowed.py`` knows passes. ngspice sees neither
+comments nor file names.
 """
 
 import os
@@ -12,18 +10,19 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from unicodedata import category
 
-from cosim.circuit.lint.dialect import in_ngspice, in_ngspice_together, prelude, since_the_start
-from cosim.circuit.lint.elements import KINDS
-from cosim.circuit.lint.lines import MAX_LINE, Line, refuse, shown, unusable
-from cosim.circuit.lint.words import definitions, number, word_set
+from cosim.circuit.dialect.functions import prelude
+from cosim.circuit.dialect.lines import MAX_LINE, Line, refuse, shown, unusable
+from cosim.circuit.dialect.models import in_ngspice_together
+from cosim.circuit.dialect.parts import since_the_start
+from cosim.circuit.dialect.words import definitions, number
+from cosim.circuit.lint.allowed import directive, passed
+from cosim.circuit.lint.logical import checked, decoded, logical
 from cosim.errors import BadInput, plain
 from cosim.files import reader
 
 MAX_BYTES = 4_000_000
 MAX_LINES = 100_000
-MAX_WORD = 4_000
 MAX_DEPTH = 10
 MAX_INCLUDES = 1_000
 """A file counts each time it is included; files that each include the next twice double that."""
@@ -31,39 +30,6 @@ MAX_NAMES = 1_000
 """File names that :func:`named` follows from one file."""
 
 
-KEPT = word_set(
-    ".param .func .subckt .ends .model .ic .nodeset .global .options .option .opt .temp "
-    ".if .elseif .else .endif"
-)
-DROPPED = word_set(
-    ".tran .op .ac .dc .tf .noise .disto .pz .sens .sp .four .fourier .meas .measure .save .print "
-    ".plot .step .wave .probe .probe64 .width .title .csparam .backanno .prot .unprot .protect "
-    ".unprotect .autoconverge .net .savebias"
-)
-"""Analyses, output and remarks: a host sets its own; see ``outputs.py``."""
-NUMERIC_OPTIONS = word_set(
-    "abstol bypass chgtol convabs convlimit convstep cshunt defad defas defl defw gmin gminsteps "
-    "itl1 itl2 itl3 itl4 itl5 itl6 keepopinfo klu maxord method minbreak noopiter pivrel pivtol "
-    "ramptime reltol rshunt scale seed sparse srcsteps temp tnom trtol trytocompact vntol "
-    "xmu"
-)
-DROPPED_OPTIONS = word_set(
-    "acct accurate advconv autostop baudrate brief cptime fastaccess filetype flagloads ingold "
-    "interp limpts limtim list lvltim maxstep meascplxfmt measdgt noacct node noinit nomarch nomod "
-    "nopage noprobe numdgt opts plotabstol plotreltol plotvntol plotwinsize post probe runlvl "
-    "savecurrents skipbp srcstepmethod stepgmin thev_induc topologycheck warn width wnflag"
-)
-"""Options for output, which a host sets (``interp`` gives wrong waveforms), or other programs'."""
-
-MODELS = word_set(" ".join(["vswitch iswitch", *(kind.models for kind in KINDS.values())]))
-"""Not numd, nbjt, numos, whose cards name files, and no code models."""
-MOS_LEVELS = frozenset("123469")
-"""The BSIM models write a log into the working folder."""
-
-_GATES = (
-    "BUF, AND, OR, XOR of two, SCHMITT, SRFLOP and DFLOP of LTspice with Vhigh, Vlow, Ref, Vt, Vh, "
-    "Td, Trise, Tfall, Tau, Rout, Cout"
-)
 _INLINED = (".include", ".inc", ".lib")
 # The parameter's name and the first value of its list or range.
 _STEP = re.compile(
@@ -71,24 +37,6 @@ _STEP = re.compile(
 )
 _END = re.compile(r"^[ \t]*\.end\b(?![.\w])", re.IGNORECASE | re.MULTILINE)
 _SCHEMATIC = re.compile(r"Version 4\S*\s+SHEET ")
-_TEXT = re.compile(r"[ -~]*")  # printable ASCII
-_UNSAFE = re.compile(r'["`\\]')
-_FILE_WORD = re.compile(r"\b(?:\w*_)?(?:file|filename|wavefile)\b", re.IGNORECASE)
-_COMMAND_COMMENT = re.compile(r"\*\s*(?:#\s*[\w!/.]|ng_script)", re.IGNORECASE)
-_TRAILING = re.compile(r";|//|(?:^|(?<=[\s,]))\$")  # begins a comment; "$" only between words
-_NUMBERED = re.compile(r"(?<![\w.])\$(?=n_\d)", re.IGNORECASE)  # begins PSpice's own nodes
-# A value in braces or quotes, or a number.
-_VALUE = re.compile(r"\{[^{}]*\}|'[^']*'|[+-]?[\d.][\w.+-]*")
-# A name, perhaps with "=" and a value in braces, quotes or bare, or with a number.
-_OPTION = re.compile(
-    r"([a-z_]\w*)(?:\s*=\s*(\{[^{}]*\}|'[^']*'|[\w.+-]+)|\s+([\d.][\w.+-]*))?[\s,]*", re.IGNORECASE
-)
-# The model's type, or "ako:BASE" with a type that may follow it.
-_MODEL = re.compile(
-    r"\.model\s+[^\s=(){}']+\s+(ako:[^\s(){}'=]+(?:\s+[a-z]\w*(?![\w:=]))?|[a-z]\w*)(?![\w:])",
-    re.IGNORECASE,
-)
-_LEVEL = re.compile(r"(?<![\w.])level\s*(=?)\s*([^\s,()]*)", re.IGNORECASE)
 _PIECE = r"""(?:"([^"\n]*)"|'([^'\n]*)'|([^\s"'()]+))"""  # a file's name, quoted or bare
 _NAMES = re.compile(_PIECE)
 _POINTS = re.compile(rf"(?<=pwl)([\s(]*)file\b\s*=?\s*{_PIECE}", re.IGNORECASE)  # PWL(file=NAME)
@@ -118,7 +66,7 @@ def named(path: Path) -> list[Path]:
     for including in found:  # which grows meanwhile
         try:
             data = reader.read(including, MAX_BYTES - size)
-            text = _text(data)
+            text = decoded(data)
         except (reader.Refused, OSError, ValueError):  # the last for a NUL in the name
             continue
         size += len(data)
@@ -162,7 +110,7 @@ class _Reader:
         if _END.search(text):  # without .end it may be any file, and no message may quote it
             title, _, rest = text.partition("\n")
             self.lines.append(Line(_title(Line(title, name, 1)), name, 1))
-            if self._take(_logical(rest, name, 2), (self.path,)):
+            if self._take(logical(rest, name, 2), (self.path,)):
                 self.lines += self._stepped()
                 every = in_ngspice_together(self.lines)
                 self.dropped += [line for line in every if line.text.startswith(".told")]
@@ -208,7 +156,7 @@ class _Reader:
         inside = section is None
         found = outside = False
         for line in lines:
-            word, rest = _directive(line)
+            word, rest = directive(line)
             if section is not None and word in (".lib", ".endl"):
                 name = rest.strip("\"' \t").lower()
                 # A .lib with one word begins a section; with two it includes a file's section.
@@ -249,7 +197,7 @@ class _Reader:
             text = passed(self._with_points(line, base))
             return None if text is None else replace(line, text=text)
         except BadInput as error:
-            if self.depth < 1 or _directive(line)[0] in (".subckt", ".ends"):
+            if self.depth < 1 or directive(line)[0] in (".subckt", ".ends"):
                 raise
             return unusable(line, error, ".unknown")
 
@@ -278,7 +226,7 @@ class _Reader:
         if self.includes > MAX_INCLUDES:
             refuse(line, f"files are included more than {MAX_INCLUDES} times")
         file = shown(path.relative_to(self.folder).as_posix())
-        lines = _logical(self._text(path, line), file, 1)
+        lines = logical(self._text(path, line), file, 1)
         library = line.text.lower().startswith(".lib") and not section
         if not self._take(lines, (*opened, path), section, library) and section:
             refuse(line, f"{shown(name)} has no section {shown(section)}")
@@ -323,33 +271,7 @@ class _Reader:
     def _opened(self, path: Path) -> str:
         data = reader.read(path, MAX_BYTES - self.bytes_read)
         self.bytes_read += len(data)
-        return _decoded(data, path.name)
-
-
-def _text(data: bytes) -> str:
-    """Decoded from UTF-8, or Windows' UTF-16 or code page 1252, with or without byte order mark;
-    each line ends with a line feed."""
-    coding = "utf-8-sig"
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        coding = "utf-16"
-    elif data[1:2] == b"\0" or data[:1] == b"\0":
-        coding = "utf-16-le" if data[1:2] == b"\0" else "utf-16-be"
-    try:
-        text = data.decode(coding)
-    except UnicodeDecodeError:
-        text = data.decode("cp1252", "replace")
-    return text.replace("\r\n", "\n").replace("\r", "\n")
-
-
-def _decoded(data: bytes, name: str) -> str:
-    """The text. A character that some program takes for a line's end, or does not show, is refused
-    unless it is a line feed; ``passed`` refuses other control characters outside comments."""
-    text = _text(data).replace("\x1a", " ").replace("\f", " ")  # DOS's and printers' ends
-    for place, char in enumerate(text):
-        if char in "\0\v\x1c\x1d\x1e\x85" or category(char) in ("Cf", "Cs", "Zl", "Zp"):
-            line = Line("", shown(name), text.count("\n", 0, place) + 1)
-            refuse(line, f"the control character U+{ord(char):04X} cannot stand in a netlist")
-    return text
+        return checked(data, path.name)
 
 
 def _title(line: Line) -> str:
@@ -357,131 +279,10 @@ def _title(line: Line) -> str:
     title = line.text.strip()
     if "ng_script" in title.lower():
         refuse(line, "the title makes the netlist a script of commands")
-    word, rest = _directive(line)
+    word, rest = directive(line)
     if word == ".title":
         title = rest
     elif word:
         refuse(line, f"the first line is the title and cannot be {shown(word)}")
     words = re.sub(r"[^\w ,.:()/+-]", " ", title, flags=re.ASCII).split()
     return f"* {' '.join(words)[:200] or 'netlist'}"
-
-
-def _logical(text: str, file: str, first: int) -> Iterator[Line]:
-    """The lines with content, translated to ngspice's dialect."""
-    for line in _joined(text, file, first):
-        yield from in_ngspice(line)
-
-
-def _joined(text: str, file: str, first: int) -> Iterator[Line]:
-    """The lines without comments, continuations joined to what they continue."""
-    pending: Line | None = None
-    for place, raw in enumerate(text.split("\n"), first):
-        content = _without_comment(Line(raw, file, place))
-        if not content:
-            continue
-        line = Line(content, file, place)
-        if content.startswith("+"):
-            if pending is None:
-                refuse(line, "the line continues nothing")
-            content = f"{pending.text} {content[1:].strip()}"
-            pending = Line(content, file, pending.number)
-        else:
-            if pending is not None:
-                yield pending
-            pending = line
-        if len(content) > MAX_LINE:
-            refuse(line, f"the line is longer than {MAX_LINE} characters")
-    if pending is not None:
-        yield pending
-
-
-def _without_comment(line: Line) -> str:
-    content = line.text.strip()
-    if content.startswith("*"):
-        if _COMMAND_COMMENT.match(content):
-            refuse(line, "a comment that begins with *# or *ng_script is a command to ngspice")
-        return ""
-    content = _NUMBERED.sub("", content)
-    end = _TRAILING.search(content)
-    return " ".join((content[: end.start()] if end else content).split())
-
-
-def _directive(line: Line) -> tuple[str, str]:
-    """The dot word of a line, lower case, and what follows; no word for an element."""
-    text = line.text.strip()
-    if not text.startswith("."):
-        return "", text
-    match = re.match(r"\.[^\s=({'\"]*", text)
-    word = match[0] if match else "."
-    return word.lower(), text[len(word) :].strip()
-
-
-def passed(line: Line) -> str | None:
-    """The text of a logical line if ngspice may see it, None if it is dropped. Raises BadInput."""
-    word, rest = _directive(line)
-    if "ng_script" in line.text.lower():
-        refuse(line, "ng_script would make the netlist a script of commands")
-    if word in DROPPED:
-        return None
-    if word == ".ends":
-        return word  # libraries have remarks behind it
-    if word and word not in KEPT:
-        till = ", and all up to .endc: a scene tells what is run" if word == ".control" else ""
-        refuse(line, f"{shown(word)} is not allowed in a netlist; leave it out{till}")
-    if not _TEXT.fullmatch(line.text) or _UNSAFE.search(line.text):
-        odd = next(c for c in line.text if not " " <= c <= "~" or c in '"`\\')
-        refuse(line, f"the character {shown(odd)} cannot stand in a netlist outside comments")
-    if max(map(len, line.text.split())) > MAX_WORD:
-        refuse(line, f"a word is longer than {MAX_WORD} characters")
-    if found := _FILE_WORD.search(line.text):
-        cure = "a netlist may not name files; write the values of this one into the line"
-        refuse(line, f"{shown(found[0])} is not allowed, as {cure}")
-    if word == ".temp" and not _VALUE.fullmatch(rest.lstrip("= ")):
-        one = "must have one temperature in °C, a number or {…}"
-        cure = "for several write {NAME}, and sweep over circuit.param.NAME"
-        refuse(line, f".temp {shown(rest)}".rstrip() + f" {one}; {cure}")
-    if word in (".options", ".option", ".opt"):
-        return _options(line, word, rest)
-    if word == ".model":
-        return _model(line)
-    if word == ".param" and not rest:
-        return None
-    if not word and line.text[0].lower() not in KINDS:
-        name = line.text.split()[0]
-        known = f" but {_GATES}" if name[0] in "aA" else ""
-        cure = f"{'take a model for PSpice, or ' * bool(known)}write it with R, C and B sources"
-        refuse(line, f"{shown(name)} is no element that a netlist may have{known}; {cure}")
-    return line.text
-
-
-def _options(line: Line, word: str, rest: str) -> str | None:
-    kept: list[str] = []
-    place = 0
-    while place < len(rest):
-        match = _OPTION.match(rest, place)
-        if match is None:
-            refuse(line, f"{shown(rest[place:])} is no option")
-        name = match[1].lower()
-        if name in NUMERIC_OPTIONS:
-            if match[2] and name != "method" and not _VALUE.fullmatch(match[2]):
-                refuse(line, f"{shown(match[0].strip())} must have a number, or a name in {{…}}")
-            kept.append("=".join(filter(None, match.groups())))
-        elif name not in DROPPED_OPTIONS and not name.startswith("dig"):
-            refuse(line, f"the option {shown(name)} is not allowed in a netlist; leave it out")
-        place = match.end()
-    return f"{word} {' '.join(kept)}" if kept else None
-
-
-def _model(line: Line) -> str:
-    match = _MODEL.match(line.text)
-    if match is None:
-        refuse(line, f"{shown(line.text)} is no complete .model line")
-    kind = match[1].lower().split()[-1]  # "ako:BASE" where no type follows it
-    if kind not in MODELS and not kind.startswith("ako:"):
-        refuse(line, f"models of type {shown(kind)} are not allowed in a netlist")
-    if kind in MODELS - {"nmos", "pmos"}:
-        return line.text
-    for equals, level in _LEVEL.findall(line.text):
-        if not equals or level not in MOS_LEVELS:
-            refuse(line, f"MOS models of level {shown(level)} are not allowed: some write files")
-    return line.text

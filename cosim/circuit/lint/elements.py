@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from itertools import accumulate
 from typing import NamedTuple, NoReturn
 
-from cosim.circuit.lint.lines import COPY, Line, refuse, shown
-from cosim.circuit.lint.words import definitions, split_assignments, words
+from cosim.circuit.dialect.lines import COPY, Line, refuse, shown
+from cosim.circuit.dialect.words import definitions, split_assignments, words
 from cosim.errors import BadInput
 
 GROUND = "0"

@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
 
-from cosim.circuit.lint.deck import Line, refuse, shown
-from cosim.circuit.lint.dialect import FUNCTIONS
-from cosim.circuit.lint.elements import Element, Scope
-from cosim.circuit.lint.words import (
+from cosim.circuit.dialect.functions import FUNCTIONS
+from cosim.circuit.dialect.lines import Line, refuse, shown
+from cosim.circuit.dialect.words import (
     closing,
     definitions,
     number,
@@ -20,6 +19,7 @@ from cosim.circuit.lint.words import (
     unbraced,
     word_set,
 )
+from cosim.circuit.lint.elements import Element, Scope
 
 _RANDOM = {"agauss": 3, "gauss": 3, "aunif": 2, "unif": 2, "limit": 2}
 _ONE_ARGUMENT = word_set(

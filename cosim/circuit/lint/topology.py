@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from cosim.circuit.lint.deck import Line, refuse, shown
+from cosim.circuit.dialect.lines import Line, refuse, shown
 from cosim.circuit.lint.elements import GROUND, Element, Scope
 from cosim.circuit.lint.expressions import body, sensed
 

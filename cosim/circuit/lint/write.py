@@ -8,9 +8,10 @@ keys are refused.
 import re
 from collections.abc import Iterator, Mapping
 
-from cosim.circuit.lint.deck import MOS_LEVELS, Line, refuse, shown
+from cosim.circuit.dialect.lines import Line, refuse, shown
+from cosim.circuit.dialect.words import NUMBER, closing, definitions, word_set, words
+from cosim.circuit.lint.allowed import MOS_LEVELS
 from cosim.circuit.lint.elements import KINDS, Element
-from cosim.circuit.lint.words import NUMBER, closing, definitions, word_set, words
 
 _NAME = re.compile(r"[a-z_][\w.$#]*", re.IGNORECASE)
 _NODES = re.compile(r"[vi]\s*\([^(){}=']*\)", re.IGNORECASE)

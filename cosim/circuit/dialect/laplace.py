@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from functools import reduce
 from itertools import zip_longest
 
-from cosim.circuit.lint.words import NUMBER, closing, number
+from cosim.circuit.dialect.words import NUMBER, closing, number
 
 # Name, two nodes, control (an expression, V=… or two nodes), LAPLACE, law; LTspice's options go.
 _FORM = re.compile(

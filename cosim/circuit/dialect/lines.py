@@ -6,6 +6,8 @@ from typing import NoReturn
 from cosim.errors import BadInput, printable
 
 MAX_LINE = 200_000
+MOST = 50
+"""At most so many coefficients of a polynomial, and so many tables or integrals in a line."""
 COPY = "; copy its .model line into the netlist"
 
 

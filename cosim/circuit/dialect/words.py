@@ -1,6 +1,7 @@
 """The words of a netlist's line: brackets, assignments and definitions, as ngspice splits them."""
 
 import re
+from collections.abc import Collection
 from functools import cache
 
 _ASSIGNED = re.compile(r"\s*(?<![<>=!])=(?!=)\s*")  # "=", but no comparison
@@ -13,6 +14,14 @@ NUMBER = re.compile(
 _FACTORS = {"t": 1e12, "g": 1e9, "meg": 1e6, "k": 1e3, "mil": 25.4e-6, "m": 1e-3, "u": 1e-6,
             "n": 1e-9, "p": 1e-12, "f": 1e-15}  # fmt: skip
 """1A is an ampere: "a" for atto exists only in later versions of ngspice."""
+
+# A value in braces, in single quotes or bare, as a group.
+VALUE = r"(\{[^{}]*\}|'[^']*'|[^\s,()\"{}'=]++)"
+# KEY=VALUE, the value in double quotes or as VALUE, without the latter's group.
+_PAIR = re.compile(rf"""(?<!\S)([a-z]\w*)\s*=\s*("[^"]*"|{VALUE[1:-1]})""", re.IGNORECASE)
+# .model, its name and base, and its type as a group.
+MODEL = re.compile(r"\.model\s+\S+\s+(?:ako:\s*\S+\s+)?(\w+)", re.IGNORECASE)
+WORD = re.compile(r"[^\s,]+")
 
 
 @cache
@@ -114,3 +123,10 @@ def split_assignments(found: list[str]) -> tuple[list[str], list[str]]:
         if word in ("params:", "optional:", "text:") or "=" in word:
             return found[:i], [word for word in found[i:] if "=" in word]
     return found, []
+
+
+def taken(text: str, keys: Collection[str]) -> tuple[str, dict[str, str]]:
+    """The text without the assignments to these keys, and their values."""
+    given = {match[1].lower(): match[2] for match in _PAIR.finditer(text)}
+    less = _PAIR.sub(lambda match: "" if match[1].lower() in keys else match[0], text)
+    return less, {key: value for key, value in given.items() if key in keys}
