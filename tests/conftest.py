@@ -14,7 +14,7 @@ from hypothesis.internal.conjecture import providers
 import build_c
 from cosim.files import picture
 from cosim.simulation import checks
-from cosim.toolchain import processes
+from cosim.toolchain import processes, threads
 from cosim.toolchain.libraries import FOLDER
 
 # How long an example takes says something of the machine, not of the code.
@@ -35,7 +35,7 @@ def pytest_configure() -> None:
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
     """One more than there are processors: the tests of processes wait for them."""
-    return processes.processors() + 1
+    return threads.processors() + 1
 
 
 @pytest.fixture(scope="session", autouse=True)

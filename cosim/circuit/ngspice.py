@@ -25,7 +25,7 @@ from cosim.circuit.dialect.words import sent
 from cosim.circuit.joined import drawn
 from cosim.errors import BadInput, SimulationFailed, plain
 from cosim.toolchain.libraries import library, ngspice_library
-from cosim.toolchain.processes import retire
+from cosim.toolchain.serving import retire
 
 _ffi: Any = Shared.ffi
 

@@ -25,7 +25,7 @@ from cosim.evaluate.point import (
 from cosim.evaluate.store import Store, hashed
 from cosim.scene import Scene
 from cosim.scene.messages import check_whole
-from cosim.toolchain.processes import processors
+from cosim.toolchain.threads import processors
 
 TOGETHER = 64
 """Most points in one task of the fast solver, which fills its lanes with runs of like duration."""

@@ -12,7 +12,9 @@ from cosim.circuit.lint.deck import named as netlist_files
 from cosim.errors import CosimError
 from cosim.scene import Scene, changed
 from cosim.scene.model import periods_for
-from cosim.toolchain.processes import TRIES, ProcessLost, Progress
+from cosim.toolchain.processes import TRIES
+from cosim.toolchain.threads import Progress
+from cosim.toolchain.worker import ProcessLost
 
 Number = float | int
 Settings = Mapping[str, Number | str]

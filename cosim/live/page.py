@@ -15,7 +15,7 @@ from cosim.errors import BadInput, plain
 from cosim.live import rigs
 from cosim.scene import load, to_link
 from cosim.scene.tables import FRAME_RATE
-from cosim.toolchain.processes import Progress
+from cosim.toolchain.threads import Progress
 from cosim.trials.recording import GAP, Recording
 
 _WEB = Path(__file__).with_name("web")

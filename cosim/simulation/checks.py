@@ -32,7 +32,7 @@ from cosim.scene import KEYS, Scene, changed
 from cosim.simulation.elsewhere import one_run
 from cosim.simulation.fidelity import LEAST, Fidelity, relative_error
 from cosim.simulation.here import few_rows, simulate_here
-from cosim.toolchain.processes import Progress, threads
+from cosim.toolchain.threads import Progress, threads
 from cosim.waveforms.result import Result
 
 COARSER = 3.5

@@ -25,7 +25,7 @@ from cosim.scene import Scene, changed
 from cosim.simulation.elsewhere import one_run
 from cosim.simulation.fidelity import COMPLETE, JUDGES, SEARCHES, Fidelity, relative_error
 from cosim.simulation.here import few_rows
-from cosim.toolchain.processes import processors
+from cosim.toolchain.threads import processors
 from cosim.waveforms.quantities import percent
 from cosim.waveforms.result import Result
 

@@ -19,7 +19,9 @@ from cosim.files.spill import Packed, place
 from cosim.scene import Scene
 from cosim.toolchain import fence
 from cosim.toolchain.libraries import ngspice_library
-from cosim.toolchain.processes import Bounds, ProcessLost, Progress, end_idle, in_a_worker, isolated
+from cosim.toolchain.processes import end_idle, in_a_worker, isolated
+from cosim.toolchain.threads import Progress
+from cosim.toolchain.worker import Bounds, ProcessLost
 from cosim.waveforms.result import Result
 
 

@@ -28,7 +28,7 @@ from cosim.simulation.rungs.rung import commanded
 from cosim.simulation.summary import slips
 from cosim.stepper.stepper import LANES, OWN, RIG, numbers
 from cosim.toolchain.libraries import library, structures
-from cosim.toolchain.processes import Progress
+from cosim.toolchain.threads import Progress
 from cosim.toolchain.versions import versions
 from cosim.trials.camera import FRAME_RATE, accelerations, instants_a_frame, shown
 from cosim.waveforms.columns import COLUMNS

@@ -14,7 +14,7 @@ from cosim.simulation.guards import remarks
 from cosim.simulation.rungs.given_surface import move_part
 from cosim.simulation.rungs.rung import Driven, drive
 from cosim.simulation.summary import motion, numbers
-from cosim.toolchain.processes import Progress
+from cosim.toolchain.threads import Progress
 from cosim.waveforms.columns import COLUMNS, UNITS
 from cosim.waveforms.result import Result
 

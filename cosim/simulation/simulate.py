@@ -11,7 +11,7 @@ from typing import Any, Literal
 from cosim.errors import BadInput, BeyondModel
 from cosim.scene import Overrides, Scene, changed, load
 from cosim.simulation.elsewhere import one_run
-from cosim.toolchain.processes import Progress
+from cosim.toolchain.threads import Progress
 from cosim.typed import typed
 from cosim.waveforms.result import Result
 

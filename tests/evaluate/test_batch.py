@@ -13,7 +13,7 @@ from cosim.evaluate.many import each, threads
 from cosim.mechanics import pace
 from cosim.scene import Scene, load
 from cosim.simulation.simulate import simulate, summary
-from cosim.toolchain.processes import Progress
+from cosim.toolchain.threads import Progress
 
 Summary = dict[str, Any]
 SHORT: dict[str, Any] = {"run.duration": 0.15, "run.settle": 0.05, "run.output_step": 0.05}

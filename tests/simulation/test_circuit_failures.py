@@ -23,7 +23,7 @@ from cosim.scene import load
 from cosim.simulation import elsewhere
 from cosim.simulation.rungs.spice import _refuse_foreign_coil
 from cosim.simulation.simulate import simulate
-from cosim.toolchain import processes
+from cosim.toolchain import processes, worker
 from tests.helpers import needs
 
 pytestmark = pytest.mark.reliability
@@ -177,7 +177,7 @@ def test_dying_process(harm: str) -> None:
     ("limit", "harm"), [("PATIENCE", "while True: pass"), ("STALLED", "time.sleep(60)")]
 )
 def test_hanging_process(limit: str, harm: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(processes, limit, 2.0)
+    monkeypatch.setattr(worker, limit, 2.0)
     with pytest.raises(SimulationFailed, match=r"hangs.* 2 s.* an FMU can"):
         processes.isolated(_harmful, harm, lambda _: None)
 
@@ -185,7 +185,7 @@ def test_hanging_process(limit: str, harm: str, monkeypatch: pytest.MonkeyPatch)
 @needs.posix
 def test_a_pause_is_no_hang(monkeypatch: pytest.MonkeyPatch) -> None:
     """The process is stopped for longer than the patience with one that works."""
-    monkeypatch.setattr(processes, "PATIENCE", 1.0)
+    monkeypatch.setattr(worker, "PATIENCE", 1.0)
     stop = (
         "import subprocess\npid = os.getpid()\n"
         "subprocess.Popen(['sh', '-c', f'kill -STOP {pid}; sleep 3; kill -CONT {pid}'])\n"

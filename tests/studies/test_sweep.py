@@ -28,8 +28,8 @@ from cosim.studies.sweep import figure
 from cosim.studies.sweep.design import Design, grid, sample
 from cosim.studies.sweep.report import table
 from cosim.studies.sweep.run import sweep
-from cosim.toolchain import processes
 from cosim.toolchain.processes import in_place
+from cosim.toolchain.worker import living
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -146,7 +146,7 @@ def test_worker_that_keeps_dying() -> None:
 
     def kill() -> None:
         while 0 not in outcomes:
-            for worker in [each() for each in list(processes._living.values())]:
+            for worker in [each() for each in list(living.values())]:
                 # Only that point takes so long.
                 begun = hasattr(worker, "_process")
                 if worker is not None and begun and worker.alive and worker.reached > 0.3:

@@ -152,8 +152,8 @@ def test_a_disk_full_in_mid_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[
 PATIENT = """
 import sys
 from cosim.cli.main import main
-from cosim.toolchain import processes
-processes.PATIENCE = 2.0
+from cosim.toolchain import worker
+worker.PATIENCE = 2.0
 sys.exit(main(sys.argv[1:]))
 """
 
@@ -194,7 +194,7 @@ def test_failures_of_the_machine_are_tried_again(
     short = {"run.duration": 0.01, "run.settle": 0.0}
     whole = sweep("paper", over, short, out=tmp_path / "calm", workers=1)
     with monkeypatch.context() as patch:
-        patch.setattr("cosim.toolchain.processes.STALLED", -1.0)
+        patch.setattr("cosim.toolchain.worker.STALLED", -1.0)
         lost = sweep("paper", over, short, out=tmp_path / "wild", workers=1)
     assert (lost.failure != "").all() and "hangs" in str(lost.failure.values[0])
     again = sweep("paper", over, short, out=tmp_path / "wild", workers=1)

@@ -16,7 +16,8 @@ from cosim.scene import load
 from cosim.simulation.elsewhere import bounds
 from cosim.toolchain import fence
 from cosim.toolchain.libraries import ngspice_library
-from cosim.toolchain.processes import Bounds, isolated
+from cosim.toolchain.processes import isolated
+from cosim.toolchain.worker import Bounds
 
 pytestmark = [
     pytest.mark.reliability,

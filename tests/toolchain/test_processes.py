@@ -13,6 +13,7 @@ import pytest
 
 import cosim
 from cosim.toolchain import processes
+from cosim.toolchain.worker import Bounds
 from tests.helpers import needs
 
 pytestmark = pytest.mark.reliability
@@ -133,10 +134,10 @@ def test_one_that_dies_as_it_starts_is_tried_again(tmp_path: Path) -> None:
     """Whatever kills it: memory that others have, a hand."""
     marker = tmp_path / "tried"
     marker.write_text("")
-    bounds = processes.Bounds((str(tmp_path),), first=partial(_die_once, str(marker)))
+    bounds = Bounds((str(tmp_path),), first=partial(_die_once, str(marker)))
     assert processes.isolated(_is_alive, None, lambda _: None, bounds) == "alive"
     marker.write_text("always")
-    bounds = processes.Bounds(first=partial(_die_once, str(marker)))
+    bounds = Bounds(first=partial(_die_once, str(marker)))
     with pytest.raises(cosim.SimulationFailed, match=r"cannot start \(exit code 9"):
         processes.isolated(_is_alive, None, lambda _: None, bounds)
 

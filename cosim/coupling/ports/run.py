@@ -27,7 +27,7 @@ from cosim.drive.pieces import Ahead
 from cosim.errors import SimulationFailed, plain
 from cosim.files.spill import Tape
 from cosim.scene import Scene
-from cosim.toolchain.processes import end_used, used
+from cosim.toolchain.serving import end_used, used
 
 _POINTS = 2048
 """Points that the blocks of the logs hold before they are emptied."""

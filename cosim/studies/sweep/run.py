@@ -24,7 +24,7 @@ from cosim.simulation.checks import motion
 from cosim.studies.sweep import dataset
 from cosim.studies.sweep.design import Design, grid, sample
 from cosim.studies.sweep.report import MOTION, MOTIONS, fastest
-from cosim.toolchain.processes import Progress
+from cosim.toolchain.threads import Progress
 from cosim.toolchain.versions import versions
 from cosim.typed import typed
 from cosim.waveforms.columns import UNITS
