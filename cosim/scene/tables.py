@@ -505,17 +505,6 @@ class Coupling(Table):
         1e-3, "1", 1e-6, 0.5, "With auto: allowed error of the part's height, relative to its range"
     )
 
-    @model_validator(mode="before")
-    @classmethod
-    def _refuse_repeating(cls, data: Any) -> Any:
-        method = data.get("method") if isinstance(data, dict) else None
-        if method in ("iterated", "error-controlled", "event-aware"):
-            raise fault(
-                f'coupling.method = "{method}" repeats steps, which ngspice cannot; it is for '
-                "cosim.coupling's other participants"
-            )
-        return data
-
 
 GIVEN_SURFACES = {
     "optimal": {"frequency", "acceleration_max", "optimum"},

@@ -101,7 +101,7 @@ FILES = [
     ("[friction]\nmu_k = 0.8", "friction.mu_k = 0.8 must be at most friction.mu_s = 0.72"),
     ("[friction]\nmu_s = 0.5", "friction.mu_k = 0.59 must be at most friction.mu_s = 0.5"),
     ("[coupling]\nmethod = 'jacoby'", "did you mean jacobi?"),
-    ("[coupling]\nmethod = 'iterated'", 'coupling.method = "iterated" repeats steps'),
+    ("[coupling]\nmethod = 'iterated'", 'method = "iterated" must be one of "step-locked"'),
     ("[coupling]\nmacro_step = 0", "must be a number from 1e-07 to 1 s"),
     ("[coupling]\norder = 3", "must be a whole number from 0 to 2"),
     ("[run]\nsettle = 2", "run.settle = 2 s must be below run.duration = 2 s"),
