@@ -1,6 +1,6 @@
 """The study's answer: gains of each change, paired rig by rig, and the sentences made of them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite, nan
 
@@ -105,13 +105,13 @@ def sentences(study: Study) -> list[str]:
     up, camera = BY_NAME["v_up"], BY_NAME["a_camera"]
     by_up, by_camera = gains(study, up), gains(study, camera)
     said = [
-        *_in_short(by_up),
-        *_as_it_is(study, up),
+        _in_short(by_up),
+        _as_it_is(study, up),
         LEGEND if len(study.rigs) > 1 else "",
-        *(words for group in GROUPS for words in _group(by_up, group)),
-        *_in_short(by_camera),
-        *_as_it_is(study, camera),
-        *(words for group in ("waveform", "circuit", "coil") for words in _group(by_camera, group)),
+        *(_group(by_up, group) for group in GROUPS),
+        _in_short(by_camera),
+        _as_it_is(study, camera),
+        *(_group(by_camera, group) for group in ("waveform", "circuit", "coil")),
         _slips(study),
         _warmth(study),
         _search(study),
@@ -119,13 +119,12 @@ def sentences(study: Study) -> list[str]:
     return [one for one in said if one]
 
 
-def _in_short(every: Sequence[Gain]) -> Iterator[str]:
+def _in_short(every: Sequence[Gain]) -> str:
     """How much the amplifier, the command's waveform and the coil's heat each limit the goal."""
+    rigs = max((len(gain.every) for gain in every), default=0)
+    over = f"Median gain over {rigs} rigs" if rigs > 1 else "Gain"
     told = in_short(every)
-    if told:
-        rigs = max(len(gain.every) for gain in every)
-        over = f"Median gain over {rigs} rigs" if rigs > 1 else "Gain"
-        yield f"{over} in {every[0].goal.title}, robust: {told}."
+    return told and f"{over} in {every[0].goal.title}, robust: {told}."
 
 
 def in_short(every: Sequence[Gain], ranges: bool = True) -> str:
@@ -157,11 +156,11 @@ def percent(share: float) -> str:
     return f"{round(100.0 * share):+d}"
 
 
-def _as_it_is(study: Study, goal: Goal) -> Iterator[str]:
+def _as_it_is(study: Study, goal: Goal) -> str:
     every = [rig.point(AS_IT_IS, goal, "robust") for rig in study.rigs]
     robust, best = every[0], study.rigs[0].point(AS_IT_IS, goal, "best")
     if robust is None or best is None:
-        return
+        return ""
     known = [one.median * goal.scale for one in every if one]
     value, median, worst, single = (
         f"{brief(x * goal.scale)} {goal.unit}"
@@ -175,18 +174,18 @@ def _as_it_is(study: Study, goal: Goal) -> Iterator[str]:
         reached = f"a robust {value} of {goal.title}"
     if not goal.name.startswith("v_"):
         reached += f", where the part moves at {robust.v_average * 1e3:+.1f} mm/s"
-    yield (
+    return (
         f"Unchanged, the device reaches {reached}, and {worst} with the worst error of ±2 % in the "
         f"knobs. The setting that is best without errors gives {single} there, and {median} in the "
         "median over them."
     )
 
 
-def _group(every: Sequence[Gain], group: str) -> Iterator[str]:
+def _group(every: Sequence[Gain], group: str) -> str:
     """The gains of a group's changes: by name where they exceed the noise, else their range."""
     some = [gain for gain in every if gain.change.group == group and gain.every]
     if not some:
-        return
+        return ""
     named = [gain for gain in some if gain.counts]
     shown = named if len(named) <= NAMED else [*named[: NAMED - LEAST], *named[-LEAST:]]
     told = [f"{gain.change.name} {_share(gain)}" for gain in shown]
@@ -195,7 +194,7 @@ def _group(every: Sequence[Gain], group: str) -> Iterator[str]:
         told.append(f"one other {percent(rest[0])} %")
     elif rest:
         told.append(f"{len(rest)} others {percent(min(rest))} to {percent(max(rest))} %")
-    yield f"The {some[0].goal.title}, robustly, with another {GROUPS[group]}: {'; '.join(told)}."
+    return f"The {some[0].goal.title}, robustly, with another {GROUPS[group]}: {'; '.join(told)}."
 
 
 def _share(gain: Gain) -> str:
