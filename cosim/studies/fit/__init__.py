@@ -15,8 +15,8 @@ def _number_or_free(text: str) -> float | str:
 
 
 FORCES = (
-    "what is known of normal forces: a CSV with the columns trial, force, lower, upper, mass, or a "
-    "TOML with a table for each trial; or “published”"
+    "what is known of normal forces: a CSV with the columns trial, force, lower, upper, mass; or "
+    "“published”"
 )
 MU_K = (
     "kinetic friction, by which normal forces follow from µ_k F_n, or “free” to find it from the "
