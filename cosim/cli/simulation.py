@@ -107,7 +107,7 @@ def _export(run: Path, forms: list[str], out: Path | None = None) -> None:
         with writable(folder):
             files = export.export(run, forms, folder)
     else:
-        chosen = formats.parse(forms)
+        chosen = formats.parse(forms, formats.formats(), "run")
         result = formats.read(run)
         with writable(folder):
             files = formats.export(result, chosen, folder)

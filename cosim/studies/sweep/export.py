@@ -3,8 +3,9 @@
 from io import BytesIO
 from pathlib import Path
 
-from cosim.errors import BadInput, plain
+from cosim.errors import BadInput
 from cosim.files.atomic import write_all
+from cosim.waveforms.formats import parse
 from cosim.waveforms.formats.matlab import legal
 from cosim.waveforms.quantities import UNITLESS
 from cosim.waveforms.storage import read_sweep
@@ -15,12 +16,7 @@ FORMS = ("csv", "parquet", "mat")
 def export(folder: Path, lists: list[str], out: Path) -> dict[str, str]:
     """Write the points of a sweep as ``sweep.csv``, ``.parquet`` or ``.mat``. Returns a line on the
     content of each file, by its name. Raises BadInput."""
-    names = [name.strip() for text in lists for name in text.split(",")]
-    for name in names:
-        if name not in FORMS or names.count(name) > 1:
-            raise BadInput(
-                f'--as: of a sweep "{plain(name)}" must be one of {", ".join(FORMS)}, once.'
-            )
+    names = parse(lists, FORMS, "sweep")
     data = read_sweep(folder)
     units = {str(name): str(data[name].attrs.get("units", "")) for name in data.variables}
     frame = data.to_dataframe().reset_index()

@@ -4,7 +4,7 @@ A module declares its format as ``FORMAT`` and imports nothing heavy at its top.
 made from ``waveforms.nc``, whose numbers have all their digits.
 """
 
-from collections import Counter
+from collections.abc import Collection
 from functools import cache
 from io import BytesIO
 from pathlib import Path
@@ -24,15 +24,14 @@ def formats() -> dict[str, Format]:
     return {each.name: each for each in sorted(found, key=lambda each: each.name)}
 
 
-def parse(lists: list[str]) -> list[str]:
-    """The formats of comma-separated lists of them; raises BadInput for an unknown one."""
+def parse(lists: list[str], known: Collection[str], what: str) -> list[str]:
+    """The names in comma-separated lists: of formats ``known`` for ``what`` is exported, each once.
+    Raises BadInput."""
     names = [name.strip() for text in lists for name in text.split(",")]
-    for name, count in Counter(names).items():
-        if name not in formats():
-            known = ", ".join(formats())
-            raise BadInput(f'--as: there is no form "{plain(name)}" (forms: {known}).')
-        if count > 1:
-            raise BadInput(f"--as: the form {name} stands there {count} times.")
+    for name in names:
+        if name not in known or names.count(name) > 1:
+            words = f"must be one of {', '.join(known)}, once"
+            raise BadInput(f'--as: of a {what} "{plain(name)}" {words}.')
     return names
 
 
