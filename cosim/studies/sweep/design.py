@@ -135,7 +135,7 @@ def _axis(name: str, values: Sequence[Number]) -> Axis:
     for value in values:
         try:
             inside = isfinite(value) and key.holds(value) and kind(value) == value
-            inside = inside and (not key.choices or value in map(int, key.choices))
+            inside = inside and (not key.choices or value in [*map(int, key.choices)])
         except (TypeError, ValueError, OverflowError):  # no number, or one too large for a float
             raise BadInput(f"--over {name}: {shown(value)} must be {key.allowed}.") from None
         if not inside:
