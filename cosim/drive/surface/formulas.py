@@ -3,7 +3,8 @@
 The paper is Yako, Nowak, Yuan, Salisbury, *Vertical Vibratory Transport of Grasped Parts Using
 Impacts* (ICRA 2024, arXiv 2502.05693). A surface moves periodically along the vertical; a part of
 mass m_P is pressed against it by the normal force F_n. Up is positive, units are SI. Numbers in
-brackets, as in (3), are the paper's equations.
+brackets, as in (3), are the paper's equations. :meth:`Transport.coefficients` checks a case; the
+closed forms take the numbers of one that it has passed.
 """
 
 import math
@@ -46,7 +47,9 @@ class Transport:
     def coefficients(self) -> Friction:
         """The pair of :func:`horizontal_equivalent`; BadInput where no transport is possible."""
         mu_s, mu_k, a_max, f_n = self.mu_s, self.mu_k, self.a_max, self.f_n
-        _friction(mu_s, mu_k)
+        positive(mu_s=mu_s, mu_k=mu_k)
+        if mu_k > mu_s:
+            raise BadInput(f"mu_k = {mu_k:g} must not exceed mu_s = {mu_s:g}.")
         positive(a_max=a_max, f_n=f_n, period=self.period, gravity=self.gravity)
         if f_n <= least_force_ratio(mu_s):
             raise BadInput(
@@ -87,7 +90,6 @@ def sticking_range(mu_s: float, f_n: float, gravity: float = GRAVITY) -> tuple[f
 
     −µ_s F_n/m_P − g ≤ z̈_S ≤ µ_s F_n/m_P − g, in m/s².
     """
-    positive(mu_s=mu_s, f_n=f_n, gravity=gravity)
     return -(mu_s * f_n + 1.0) * gravity, (mu_s * f_n - 1.0) * gravity
 
 
@@ -98,15 +100,11 @@ def slipping_acceleration(
 
     ``relative_velocity`` is ż_S − ż_P, of which only the sign counts.
     """
-    positive(mu_k=mu_k, f_n=f_n, gravity=gravity)
-    if not relative_velocity or math.isnan(relative_velocity):
-        raise BadInput("relative_velocity must not be 0: then the part does not slip.")
     return (math.copysign(mu_k * f_n, relative_velocity) - 1.0) * gravity
 
 
 def least_force_ratio(mu_s: float) -> float:
     """(3) The ratio F_n/(m_P g) = 1/µ_s above which a resting surface holds the part."""
-    positive(mu_s=mu_s)
     return 1.0 / mu_s
 
 
@@ -117,7 +115,6 @@ def least_peak_acceleration(mu_s: float, f_n: float, gravity: float = GRAVITY) -
 
 def least_peak_acceleration_at_any_force(gravity: float = GRAVITY) -> float:
     """(5) The bound 2 g, in m/s², on a_max that (3) and (4) leave whatever friction and force."""
-    positive(gravity=gravity)
     return 2.0 * gravity
 
 
@@ -125,8 +122,6 @@ def conditions(
     mu_s: float, mu_k: float, a_max: float, f_n: float, gravity: float = GRAVITY
 ) -> dict[str, bool]:
     """Whether each condition for transport upwards, and for its robust variant, is fulfilled."""
-    _friction(mu_s, mu_k)
-    positive(a_max=a_max, f_n=f_n, gravity=gravity)
     loose = a_max > least_peak_acceleration(mu_s, f_n, gravity)
     return {
         "held_at_rest": f_n > least_force_ratio(mu_s),
@@ -148,8 +143,6 @@ def horizontal_equivalent(
     Unlike true coefficients µ̃_s is below µ̃_k, for transport up, when
     F_n/(m_P g) < 2/(µ_s − µ_k). The ``robust`` variant has µ_k in µ̃_s too.
     """
-    _friction(mu_s, mu_k)
-    positive(f_n=f_n)
     weight = sign_of(direction)
     return Friction((mu_k if robust else mu_s) * f_n - weight, mu_k * f_n + weight)
 
@@ -162,13 +155,7 @@ def horizontal_velocity(
     v = µ_s² (A² − µ_k²) g T/(4 A (µ_s + µ_k)²); 0 where a_max = µ_k g. The first phase is at
     µ_s g; where a_max is less it is at a_max, so that A stands for µ_s.
     """
-    positive(mu_s=mu_s, mu_k=mu_k, a_max=a_max, period=period, gravity=gravity)
     peak = a_max / gravity
-    if peak < mu_k:
-        raise BadInput(
-            f"a_max = {a_max:g} m/s² is too small: only mu_k g = {mu_k * gravity:g} m/s² or more "
-            "moves a surface away from a part that slips."
-        )
     share = min(mu_s, peak) / (min(mu_s, peak) + mu_k)
     return share * share * (1.0 - mu_k / peak) * (1.0 + mu_k / peak) * a_max * period / 4.0
 
@@ -182,13 +169,6 @@ def largest_force_ratio(mu: float, a_max: float, gravity: float = GRAVITY) -> fl
     With µ_s it holds for a part that sticks. With µ_k it holds for a part that slides already: then
     −µ_k F_n/m_P − g = −a_max on [T1, T2] and v_ave is 0, which it is not yet at the former ratio.
     """
-    positive(mu=mu, a_max=a_max, gravity=gravity)
-    least = least_peak_acceleration_at_any_force(gravity)
-    if a_max <= least:
-        raise BadInput(
-            f"a_max = {a_max:g} m/s² is too small: transport upwards needs more than "
-            f"2 g = {least:g} m/s²."
-        )
     return (a_max / gravity - 1.0) / mu
 
 
@@ -197,7 +177,6 @@ def cubic_force_ratio(mu_s: float, mu_k: float, a_max: float, gravity: float = G
 
     It solves µ_s µ_k² f³ + µ_s µ_k f² + µ_k f + 1 = A², and grows as A^(2/3).
     """
-    _friction(mu_s, mu_k)
     peak = largest_force_ratio(1.0, a_max, gravity) + 1.0
     ratio, low, high = mu_s / mu_k, 0.0, peak - 1.0
     # In x = µ_k f: (x + 1)(x² µ_s/µ_k + 1) = A² has one positive root, below A − 1 as µ_s ≥ µ_k.
@@ -234,12 +213,6 @@ def force_limits(case: Transport, a_max: float) -> dict[str, float]:
         "v_at_optimal": velocity,
         "v_at_optimal_over_gT": velocity / (gravity * case.period),
     }
-
-
-def _friction(mu_s: float, mu_k: float) -> None:
-    positive(mu_s=mu_s, mu_k=mu_k)
-    if mu_k > mu_s:
-        raise BadInput(f"mu_k = {mu_k:g} must not exceed mu_s = {mu_s:g}.")
 
 
 def positive(**values: float) -> None:
