@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from cosim.cli.command import Command, print_page, progress_bar, writable
-from cosim.errors import BadInput
 from cosim.studies.study import Study, Told, loaded, studies
 
 
@@ -26,12 +25,6 @@ def commands() -> list[Command]:
 
 def _run(study: Study, out: Path | None = None, **asked: Any) -> None:
     """Run a study with the options given, save and print its results."""
-    for option in study.options:
-        if option.prints and asked.pop(option.argument, False):
-            if asked or out:
-                raise BadInput(f"{option.name}: no other option goes with it.")
-            print(loaded(option.prints)())
-            return
     shown = asked.pop("show", False)
     title = study.name
     if "<scene>" in study.out:

@@ -44,8 +44,6 @@ class Option:
     needed: bool = False
     read: str = ""
     """Function that makes the argument of the value (a list where ``many``); raises BadInput."""
-    prints: str = ""
-    """Function that makes a text: with the option only this is printed, and the study not run."""
 
     @property
     def argument(self) -> str:

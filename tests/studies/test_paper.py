@@ -23,6 +23,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.optimize import minimize_scalar
 
 import cosim
+from benchmarks.errata import errata, errata_text
 from cosim.cli.main import main
 from cosim.drive.surface import formulas
 from cosim.drive.surface.formulas import Transport
@@ -35,7 +36,6 @@ from cosim.drive.surface.waveforms import (
 )
 from cosim.errors import BadInput
 from cosim.studies.paper import figure7, figures, knife_edge
-from cosim.studies.paper.errata import errata, errata_text
 from cosim.studies.paper.theory import theory
 from tests.helpers import needs
 from tests.helpers.examples import examples
@@ -407,12 +407,7 @@ def test_the_misprints_as_text():
     assert max(len(line) for line in text.splitlines()) <= 92
 
 
-def test_the_command_says_what_it_takes_and_writes(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-):
-    for more in (["--period", "0.1"], ["--out", str(tmp_path / "out")]):
-        assert main(["theory", "--errata", *more]) == 2
-        assert "no other option" in capsys.readouterr().err
+def test_the_command_says_what_it_takes_and_writes(capsys: pytest.CaptureFixture[str]):
     with pytest.raises(SystemExit):
         main(["theory", "--help"])
     told = capsys.readouterr().out

@@ -1,4 +1,4 @@
-"""The paper's closed forms as numbers and figures, its misprints, and its optimum's knife edge.
+"""The paper's closed forms as numbers and figures, and its optimum's knife edge.
 
 The formulas themselves, with source and symbols, are in :mod:`cosim.drive.surface.formulas`.
 """
@@ -12,20 +12,12 @@ _GIVEN = (
     ("--f-n", "normal force over the part's weight", "RATIO", 5.0),
     ("--period", "period, s", "S", 0.05),
 )
-_ERRATA = Option(
-    *("--errata", "only print the paper's misprints, each proven"),
-    kind=bool,
-    prints="paper.errata.errata_text",
-)
 
 STUDIES = (
     Study(
         "paper.theory.theory",
         "the paper's closed forms: theory.json, knife_edge.csv, the figures 3, 4 and knife_edge",
-        (
-            *(Option(name, help, unit, float, default) for name, help, unit, default in _GIVEN),
-            _ERRATA,
-        ),
+        tuple(Option(name, help, unit, float, default) for name, help, unit, default in _GIVEN),
         command="theory",
         out="results/theory",
         saves=False,

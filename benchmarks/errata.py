@@ -1,5 +1,9 @@
 """The paper's misprints, each with a proof that is computed at each call.
 
+    python -m benchmarks.errata
+
+prints them, in about a second.
+
 The proofs use none of the closed forms: they simulate a part on a vibrating surface from event to
 event. In the paper's units: f = F_n/(m_P g), A = a_max/g, times in periods, accelerations in g,
 velocities in g T; µ_s = 0.7 and µ_k = 0.6 as in the paper's figures.
@@ -11,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from cosim.arrays import Array
 from cosim.drive.surface.waveforms import ROUNDING_MARGIN
@@ -218,11 +223,13 @@ def _moved_sliding(f: float) -> float:
 
 def _best_f(peak: float) -> float:
     """The ratio f = F_n/(m_P g) at which the simulated transport is fastest, A = ``peak``."""
-    from scipy.optimize import minimize_scalar
-
     found: Any = minimize_scalar(
         lambda f: -_moved(_cycle(f, peak, peak), f),
         bounds=(1 / MU_S, (peak - 1) / MU_S),
         options={"xatol": 1e-7},
     )
     return float(found.x)
+
+
+if __name__ == "__main__":
+    print(errata_text())
