@@ -32,23 +32,19 @@ def _new(file: Path, kind: str = "machine", base: str | None = None) -> None:
     base = "paper-limited" if base is None else base
     if base not in (known := [scene for scene, *_ in list_scenes()]):
         raise BadInput(f"--base {plain(base)}: must be a built-in scene{suggestion(base, known)}.")
-    texts = {}
+    texts: dict[Path, str] = {}
     if kind == "fmu":
         texts[file] = (circuits() / "new" / "fmu.toml").read_text(encoding="utf-8")
-    else:
-        scene = load(base)
-        if kind == "circuit":
-            if scene.has_ports:
-                raise BadInput(f"--base {base}: has FMUs of its own; take a scene without.")
-            scene = scene.having(circuit=CAREFUL)
-        texts[file] = to_toml(scene, base)
-    if kind == "circuit":
+    elif kind == "circuit":
+        if (scene := load(base)).has_ports:
+            raise BadInput(f"--base {base}: has FMUs of its own; take a scene without.")
+        told = {"description": "The machine on a circuit of my own"}
+        text = to_toml(scene.having(circuit=CAREFUL).model_copy(update=told), base)
         own = f'[circuit]\nmodel = "file"\nnetlist = "{file.stem}.cir"  # beside this file\n'
-        text = texts[file].replace("[circuit]\n", own)
-        text = re.sub(
-            "description = .*", 'description = "The machine on a circuit of my own"', text
-        )
+        text = text.replace("[circuit]\n", own)
         texts[file] = re.sub("(?m)^# (model|netlist) = .*\\n", "", text)
+    else:
+        texts[file] = to_toml(load(base), base)
     if kind != "machine":
         text = (circuits() / "new" / f"{kind}.cir").read_text(encoding="utf-8")
         texts[file.with_suffix(".cir")] = text
