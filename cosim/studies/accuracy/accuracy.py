@@ -134,11 +134,8 @@ class Comparison:
             rows.append({"line": label.replace("\n", " ")} | errors | times)
         return rows
 
-    def methods(self) -> list[Row]:
-        """Every method: its order, that fitted on each scene, failures, and missing lines."""
-        return [self._method(solver) for solver in self.solvers]
-
-    def _method(self, solver: Solver) -> Row:
+    def method(self, solver: Solver) -> Row:
+        """A method: its order, that fitted on each scene, failures, and missing lines."""
         own = {scene: self.of(scene, solver.name) for scene in self.scenes}
         failures = Counter(run.failure for runs in own.values() for run in runs if run.failure)
         absent: dict[str, list[str]] = {}
@@ -205,7 +202,9 @@ def report(runs: Sequence[Run], solvers: Sequence[Solver] = SOLVERS) -> Report:
     tables = {
         f"The strong lines: error in {EQUAL_TIME:g} s, time for an error of {EQUAL_ERROR:g} "
         "(interpolated between runs)": study.compared(),
-        "Every method: order in its step, fitted over the last four halvings": study.methods(),
+        "Every method: order in its step, fitted over the last four halvings": [
+            study.method(solver) for solver in solvers
+        ],
     }
     figure = partial(draw, runs, study.strong, study.message)
     return Report(

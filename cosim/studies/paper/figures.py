@@ -13,7 +13,7 @@ from cosim.drive.surface import formulas
 from cosim.drive.surface.formulas import Transport
 from cosim.drive.surface.waveforms import Cycle, optimal_cycle
 from cosim.files.picture import Picture, grid, legend_above
-from cosim.studies.plots import footnote, headline
+from cosim.studies.plots import headline, panels
 from cosim.waveforms.figure import PART, STICKING, SURFACE
 
 GUIDELINE = (4.0, 16.0)
@@ -28,31 +28,27 @@ def draw_cycle(case: Transport) -> Picture:
     """Figure 3: one period of the optimal waveform, surface and part."""
     cycle, mean, gravity = optimal_cycle(case), formulas.average_velocity(case), case.gravity
     slowed = formulas.slipping_acceleration(case.mu_k, case.f_n, -1.0, gravity)
-    figure = Picture(8.4, 8.6, "constrained")
-    axes = figure.subplots(3, 1, sharex=True)
+    title = (
+        f"Sticking while the surface accelerates at {cycle.accelerations[0] / gravity:.3g} g, "
+        f"slipping while it brakes at {case.a_max / gravity:.3g} g, the part moves at "
+        f"{mean * 1e3:+.2f} mm/s"
+    )
+    note = (
+        f"The optimal waveform. {_friction(case)}, F$_n$ = {case.f_n:g} m$_P$g, "
+        f"T = {case.period * 1e3:.5g} ms; {mean / (gravity * case.period):.4f} gT"
+    )
+    figure, axes = panels(title, note, (8.4, 8.6), 3, 1, sharex=True)
     _motion(axes, cycle, slowed, gravity)
     sticking = (0.0, cycle.times[1] * 1e3)
     for axis in axes:
         axis.axvspan(*sticking, color=STICKING, alpha=0.6, lw=0, zorder=0, label="sticking")
         for time in cycle.times[1:3]:
             axis.axvline(time * 1e3, color="0.35", lw=0.9, ls=":")
-        axis.grid(alpha=0.25)
     first, second = (time * 1e3 for time in cycle.times[1:3])
-    title = f"T$_1$ = {first:.5g} ms, T$_2$ = {second:.5g} ms (dotted)"
-    axes[0].set_title(title, loc="left", fontsize=10.5)
+    dotted = f"T$_1$ = {first:.5g} ms, T$_2$ = {second:.5g} ms (dotted)"
+    axes[0].set_title(dotted, loc="left", fontsize=10.5)
     legend_above(axes[0], ncols=3, columnspacing=1.1, handlelength=1.6, fontsize=9)
     axes[2].set(xlabel="time [ms]", xlim=(0.0, case.period * 1e3))
-    headline(
-        figure,
-        f"Sticking while the surface accelerates at {cycle.accelerations[0] / gravity:.3g} g, "
-        f"slipping while it brakes at {case.a_max / gravity:.3g} g, the part moves at "
-        f"{mean * 1e3:+.2f} mm/s",
-    )
-    footnote(
-        figure,
-        f"The optimal waveform. {_friction(case)}, F$_n$ = {case.f_n:g} m$_P$g, "
-        f"T = {case.period * 1e3:.5g} ms; {mean / (gravity * case.period):.4f} gT",
-    )
     return figure
 
 
