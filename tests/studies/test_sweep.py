@@ -255,7 +255,7 @@ def test_waveforms_stay_within_the_sweeps_folder(linked: bool, tmp_path: Path) -
 
 def test_keys_with_choices_are_drawn_from_them() -> None:
     over = {"coil.polarity": [-1, 1], "drive.amplitude": [5.0, 8.0]}
-    design = sample(over, 12, 0, False)
+    design = sample(over, 12, 0)
     found = [design.point(k)["coil.polarity"] for k in range(12)]
     assert (found.count(-1), found.count(1)) == (6, 6)
 
@@ -263,8 +263,8 @@ def test_keys_with_choices_are_drawn_from_them() -> None:
 def test_latin_hypercube() -> None:
     """Each of N equal parts of each range holds one point; whole numbers stay whole."""
     over = {"drive.frequency": [10.0, 60.0], "mechanics.n_surfaces": [1, 4]}
-    design = sample(over, 40, 1, False)
-    assert design == sample(over, 40, 1, False) != sample(over, 40, 2, False)
+    design = sample(over, 40, 1)
+    assert design == sample(over, 40, 1) != sample(over, 40, 2)
     frequencies = [design.point(k)["drive.frequency"] for k in range(40)]
     assert sorted(int((f - 10.0) / 50.0 * 40) for f in frequencies) == list(range(40))
     counts = [design.point(k)["mechanics.n_surfaces"] for k in range(40)]
@@ -299,7 +299,6 @@ BAD = [
     (["--over", "coil.polarity=0,1"], "0 must be one of -1, 1"),
     (["--over", "drive.offset=1,2", "--samples", "0"], "--samples 0"),
     (["--over", "drive.offset=1", "--samples", "5"], "needs a range"),
-    (["--over", "drive.offset=1,2", "--random"], "--random needs --samples"),
     (["--over", "drive.offset=1,2", "--workers", "0"], "--workers 0"),
     (["--over", "drive.offset=1,2", "--keep", "v_prt"], '"v_prt"; did you mean v_part'),
     (["--over", "drive.offset=0:1:9999", "--over", "drive.amplitude=0:1:9999"], "points"),

@@ -19,7 +19,6 @@ STUDIES = (
         (
             *(SCENE, OVERRIDES, OVER),
             Option("--samples", SAMPLES, "N", int),
-            Option("--random", "independent samples instead of it", kind=bool),
             Option("--seed", "of the samples", "N", int, 0),
             Option(
                 *("--keep", "also keep these waveforms of every point"),

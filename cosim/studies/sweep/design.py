@@ -81,11 +81,11 @@ def grid(over: Mapping[str, Sequence[Number]]) -> Design:
     return Design(tuple(_axis(name, values) for name, values in over.items()))
 
 
-def sample(over: Mapping[str, Sequence[Number]], count: int, seed: int, random: bool) -> Design:
+def sample(over: Mapping[str, Sequence[Number]], count: int, seed: int) -> Design:
     """``count`` settings spread over the ranges of the axes, the same for the same ``seed``.
 
     A Latin hypercube (McKay, Beckman, Conover, Technometrics 21 (1979)): each axis, cut into
-    ``count`` equal parts, has one point in each. With ``random`` the points are independent.
+    ``count`` equal parts, has one point in each.
     """
     from scipy.stats import qmc
 
@@ -97,11 +97,7 @@ def sample(over: Mapping[str, Sequence[Number]], count: int, seed: int, random: 
             raise BadInput(
                 f"--over {axis.key.full}: a sample needs a range, from one value to another."
             )
-    generator = np.random.default_rng(seed)
-    if random:
-        unit = generator.random((count, len(axes)))
-    else:
-        unit = qmc.LatinHypercube(len(axes), rng=generator).random(count)
+    unit = qmc.LatinHypercube(len(axes), rng=np.random.default_rng(seed)).random(count)
     columns = []  # of each axis, its values at all points, scaled from the unit cube
     for axis, column in zip(axes, unit.T, strict=True):
         low, high = min(axis.values), max(axis.values)

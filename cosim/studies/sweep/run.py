@@ -55,7 +55,6 @@ def sweep(
     overrides: Overrides | None = None,
     *,
     samples: int | None = None,
-    random: bool = False,
     seed: int = 0,
     keep: str | Sequence[str] = (),
     out: str | os.PathLike[str] | None = None,
@@ -67,7 +66,7 @@ def sweep(
 
     ``over`` gives the values of each ``table.key``, SI; every combination is run. With ``samples``
     that many settings are spread over the ranges that the values span instead: a Latin hypercube,
-    or independent points if ``random``, the same for the same ``seed``.
+    the same for the same ``seed``.
 
     The dataset has a dimension for each key, named without its table (``ds.sel(amplitude=8)``), or
     the dimension ``point`` for samples. Its variables are the numbers of a run's ``summary`` under
@@ -89,9 +88,7 @@ def sweep(
     (('mu_s',), 'friction.mu_s')
     """
     scene = load(scene, overrides)
-    if random and samples is None:
-        raise BadInput("--random needs --samples N.")
-    design = grid(over) if samples is None else sample(over, samples, seed, random)
+    design = grid(over) if samples is None else sample(over, samples, seed)
     refuse_unknown(scene, over)
     if keep and out is None:
         raise BadInput("keep: waveforms are kept in a folder; name one as out.")
