@@ -94,7 +94,7 @@ charts: setup
 	@$(VENV)/bin/cosim run paper
 	@cp results/paper/figure.png results/paper.png
 	@$(VENV)/bin/cosim theory
-	@cp results/theory/knife_edge.png results/theory/figure[34].png results
+	@cp results/theory/figure[34].png results
 	@$(VENV)/bin/cosim sweep paper-limited --over drive.pot_frequency=0.1:0.95:18 \
 		--over drive.pot_offset=0:0.7:15 --over drive.pot_max=0.4:1:4
 	@cp results/paper-limited-sweep/figure.png results/sweep.png

@@ -4,7 +4,8 @@
 
 draws all, or the named ones: ``accuracy``, that is ``cosim chart accuracy`` with other programs and
 error-controlled macro steps added; laws of ``friction``; ``chaos``, a chaotic scene; ``choice``,
-which circuit model and tolerance to take. Each writes ``.csv``, ``.md`` and ``.png``.
+which circuit model and tolerance to take; ``knife_edge``, solvers at the paper's optimal waveform.
+Each writes ``.csv``, ``.md`` and ``.png``.
 """
 
 import argparse
@@ -17,7 +18,7 @@ from time import process_time
 
 import numpy as np
 
-from benchmarks import chaos, choice, friction
+from benchmarks import chaos, choice, friction, knife_edge
 from benchmarks.error_control import ErrorControlled
 from benchmarks.peers import lsoda, ngspice_alone
 from cosim.coupling.methods.jacobi import Jacobi
@@ -139,6 +140,7 @@ CHARTS: dict[str, Callable[[bool, Path], Report]] = {
     "friction": lambda *_: friction.report(),
     "chaos": lambda *_: chaos.report(),
     "choice": lambda quick, out: choice.choice(quick, out),
+    "knife_edge": lambda *_: knife_edge.report(),
 }
 """The arguments are ``quick`` and the folder, in which an interrupted chart is resumed."""
 

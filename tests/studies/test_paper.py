@@ -23,6 +23,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.optimize import minimize_scalar
 
 import cosim
+from benchmarks import knife_edge
 from benchmarks.errata import errata, errata_text
 from cosim.cli.main import main
 from cosim.drive.surface import formulas
@@ -35,7 +36,7 @@ from cosim.drive.surface.waveforms import (
     quaid_velocity,
 )
 from cosim.errors import BadInput
-from cosim.studies.paper import figure7, figures, knife_edge
+from cosim.studies.paper import figure7, figures
 from cosim.studies.paper.theory import theory
 from tests.helpers import needs
 from tests.helpers.examples import examples
@@ -411,7 +412,7 @@ def test_the_command_says_what_it_takes_and_writes(capsys: pytest.CaptureFixture
     with pytest.raises(SystemExit):
         main(["theory", "--help"])
     told = capsys.readouterr().out
-    assert "knife_edge.csv" in told and "(default: 98.1)" in told
+    assert "the figures 3 and 4" in told and "(default: 98.1)" in told
 
 
 @examples(50)
@@ -471,22 +472,26 @@ def test_other_impossible_numbers(call):
         call()
 
 
-def test_the_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_solvers_at_the_knife_edge(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     # the finest steps take seconds, and write what the others write
     monkeypatch.setattr(knife_edge, "METHODS", dict([*knife_edge.METHODS.items()][:2]))
+    found = knife_edge.report()
+    found.save(tmp_path)
+    assert {path.suffix for path in tmp_path.iterdir()} == {".csv", ".md", ".png"}
+    assert "Of the 152 mm/s" in repr(found) and "27 mm/s are left" in repr(found)
+
+
+def test_the_files(tmp_path: Path):
     found = theory()
     found.save(tmp_path / "out")
     numbers = found.numbers
     written = {path.name for path in (tmp_path / "out").iterdir()}
-    assert written == {
-        *("theory.json", "knife_edge.csv"),
-        *("figure3.png", "figure4.png", "knife_edge.png"),
-    }
+    assert written == {"theory.json", "figure3.png", "figure4.png"}
     assert json.loads((tmp_path / "out/theory.json").read_text("utf-8")) == numbers
     assert numbers["up"]["v_average_over_gT"] == pytest.approx(0.31065088757, abs=1e-11)
     assert numbers["normal_force"]["f_optimal"] == pytest.approx(6.7083044169, abs=1e-10)
     assert [row["a_max"] / G for row in numbers["figure4"]] == pytest.approx([5, 10, 15, 20])
-    for name in ("figure3.png", "figure4.png", "knife_edge.png"):
+    for name in ("figure3.png", "figure4.png"):
         assert (tmp_path / "out" / name).read_bytes().startswith(b"\x89PNG")
     assert "+152.37 mm/s" in repr(found)
 

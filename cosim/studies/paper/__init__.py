@@ -1,4 +1,4 @@
-"""The paper's closed forms as numbers and figures, and its optimum's knife edge.
+"""The paper's closed forms as numbers and figures.
 
 The formulas themselves, with source and symbols, are in :mod:`cosim.drive.surface.formulas`.
 """
@@ -16,13 +16,13 @@ _GIVEN = (
 STUDIES = (
     Study(
         "paper.theory.theory",
-        "the paper's closed forms: theory.json, knife_edge.csv, the figures 3, 4 and knife_edge",
+        "the paper's closed forms: theory.json, the figures 3 and 4",
         tuple(Option(name, help, unit, float, default) for name, help, unit, default in _GIVEN),
         command="theory",
         out="results/theory",
         saves=False,
-        writes="theory.json, knife_edge.csv",
-        figures=("figure3.png", "figure4.png", "knife_edge.png"),
+        writes="theory.json",
+        figures=("figure3.png", "figure4.png"),
     ),
     chart(
         "paper.figure7.paper",

@@ -43,16 +43,14 @@ class Theory:
 
     @typed
     def save(self, folder: str | os.PathLike[str]) -> None:
-        """Write ``theory.json``, the paper's figures 3 and 4, and the transport near the optimum,
-        ``knife_edge.csv`` and ``knife_edge.png``."""
-        from cosim.studies.paper import figures, knife_edge
+        """Write ``theory.json``, and the paper's figures ``figure3.png`` and ``figure4.png``."""
+        from cosim.studies.paper import figures
 
         out = Path(folder)
         write_json(out / "theory.json", self.numbers)
         self.plot().write(out / "figure3.png")
         peaks = [row["a_max"] for row in self.numbers["figure4"]]
         figures.draw_velocities(self.case, peaks).write(out / "figure4.png")
-        knife_edge.write(out, self.case)
 
     def __repr__(self) -> str:
         force, gravity = self.numbers["normal_force"], self.case.gravity
