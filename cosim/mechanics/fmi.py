@@ -95,13 +95,6 @@ class Interface:
         else:
             self._logger = fmi3.fmi3LogMessageCallback(lambda *a: self.messages.append(_text(a[3])))
             self.raw.instantiate(logMessage=self._logger)
-        self._begin()
-
-    def _begin(self) -> None:
-        """Enter the initialisation mode."""
-        if self.version == 2:
-            self.raw.setupExperiment()
-        self.raw.enterInitializationMode()
 
     def _call(self, name: str, *arguments: Any) -> None:
         """Call one of _FUNCTIONS; a foreign FMU may lack functions that are never called."""
@@ -127,10 +120,13 @@ class Interface:
         self.raw.reset()
         self._running = False
         self.messages.clear()
-        self._begin()
 
     def initialise(self) -> None:
-        """End the initialisation, in which parameters could be set."""
+        """Initialise it with the parameters and inputs set before: an FMU may use them as soon as
+        it enters the initialisation mode."""
+        if self.version == 2:
+            self.raw.setupExperiment()
+        self.raw.enterInitializationMode()
         self.raw.exitInitializationMode()
         self._running = True
 

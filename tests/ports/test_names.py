@@ -111,3 +111,22 @@ def test_a_text_is_set_and_a_name_may_have_a_sign_in_it(tmp_path: Path, version:
             cosim.run(scene, ['fmu.rotor."a=b"=5'])
         data = cosim.sweep(scene, dict(parse(['fmu.rotor."J=1"=1e-4,2e-4'])), given[:2])
     assert (data["failure"] == "").all()
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_parameters_and_name_are_known_when_it_initialises(tmp_path: Path, version: int) -> None:
+    """An FMU may use its parameters, as those of pythonfmu do, as soon as that begins. Two FMUs of
+    one file are told apart by their names."""
+    enter = f"int fmi{version}EnterInitializationMode(void *m"
+    rest = ") {" if version == 2 else ", bool a, double b, double c, bool d, double e)\n{"
+    recompiled(
+        tmp_path,
+        (f"{enter}{rest}", f"{enter}{rest} ((Model *)m)->r[D] *= 2.0;"),
+        ("case Y: return m->r[D] * m->r[U];", "case Y: return m->r[D];"),
+        (f"m->log{version} = ", f"m->steps = strlen(a); m->log{version} = "),
+    )
+    given = {"run.duration": 1e-4, "fmu.rotor.D": 3.0, "coupling.method": "step-locked"}
+    with in_place():
+        columns = cosim.run(motor(tmp_path, version=version), given).columns
+    assert (columns["rotor.y"] == 6.0).all()
+    assert columns["rotor.steps"][0] == len("rotor")

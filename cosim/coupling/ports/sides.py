@@ -80,7 +80,7 @@ class Side:
     def state(self, row: int, repeats: bool) -> Any:
         """A new instance, ready to run, as ``ports.c`` takes it; its part of the row is at the
         address ``row``. With ``repeats`` it can save and restore its state."""
-        self.instance = self.of.instance(self._parameters)
+        self.instance = self.of.instance(self._parameters, self.name)
         names = {"set_reals": "SetReal", "get_reals": "GetReal", "do_step": "DoStep"}
         if self.of.version == 3:
             names |= {"set_reals": "SetFloat64", "get_reals": "GetFloat64"}

@@ -7,6 +7,7 @@ import zipfile
 from collections import deque
 from collections.abc import Mapping
 from contextlib import suppress
+from copy import copy
 from ctypes import c_void_p, cast
 from dataclasses import dataclass
 from functools import cache
@@ -204,11 +205,13 @@ class Stranger:
             raise self.bad(f"{where}: {many if found.size > 1 else few}")
         return found, place
 
-    def instance(self, parameters: Mapping[str, Any]) -> Interface:
-        """A new instance with these start values of parameters, initialised."""
+    def instance(self, parameters: Mapping[str, Any], name: str = "cosim") -> Interface:
+        """A new instance of this name with these start values of parameters, initialised."""
         messages: deque[str] = deque(maxlen=100)
         try:
-            made = Interface(self.version, self.loaded, messages)
+            loaded = copy(self.loaded)
+            loaded.instanceName = name
+            made = Interface(self.version, loaded, messages)
             arrays: dict[str, list[Any]] = {}
             for name, value in parameters.items():
                 self._set(made, name, value, arrays)
