@@ -128,12 +128,35 @@ def run(
         return simulate(load(folder / "own.toml", settings))
 
 
-@pytest.mark.parametrize("ports", [FROM_DRIVE, BY_CIRCUIT])
+CHAIN = """
+[[fmu]]
+name = "b"
+file = "sum.fmu"
+[[port]]
+from = "drive"
+to = "b.w"
+[[port]]
+from = "b.y"
+to = "g.u"
+"""
+
+
+@pytest.mark.parametrize(
+    ("method", "ports"),
+    [
+        ("redo", FROM_DRIVE),
+        ("redo", BY_CIRCUIT),
+        ("auto", FROM_DRIVE),
+        ("auto", CHAIN),
+        ("macro-steps", CHAIN),
+    ],
+)
 def test_what_is_fed_through_from_the_drive_does_not_lag(
-    tmp_path: Path, library: Path, ports: str
+    tmp_path: Path, library: Path, method: str, ports: str
 ) -> None:
     """Half a step of 0.1 ms would be 0.03 of the amplitude."""
-    columns = run(tmp_path, library, ports, {"coupling.method": "redo"}).columns
+    given = {"coupling.method": method}
+    columns = run(tmp_path, library, ports, given).columns
     true = np.sin(2.0 * np.pi * 100.0 * columns["time"])
     assert np.abs(columns["g.y"] - true).max() < 2e-3
 

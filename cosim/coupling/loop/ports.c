@@ -237,11 +237,28 @@ static int set_inputs(Stranger *s)
                                             s->n_input_slopes, s->input_rates);
 }
 
+/* What is fed through does not lag where an FMU takes the end of a step for a mean over it. From the
+   circuit it does so only where steps are repeated: the circuit learns of the answer a step late. */
+static int has_end(const Ports *c, const Feed *f)
+{
+    return c->repeats || (f->origin.kind != FROM_PROBE && f->feed != END);
+}
+
+static int has_ends(const Ports *c, const Stranger *s)
+{
+    for (const Feed *f = s->feeds; f < s->feeds + s->n_feeds; f++)
+        if (has_end(c, f))
+            return 1;
+    return 0;
+}
+
 /* Gives the inputs of an FMU the values that they have at the end of a step. */
 static void take_ends(Ports *c, Stranger *s, double time)
 {
     for (const Feed *f = s->feeds; f < s->feeds + s->n_feeds; f++) {
         const int64_t k = f->origin.place;
+        if (!has_end(c, f))
+            continue;
         if (f->origin.kind == FROM_PROBE)
             *f->input = f->origin.scale * c->now[k] + f->origin.offset;
         if (f->origin.kind == FROM_OUTPUT)
@@ -277,7 +294,7 @@ static int step_once(Ports *c, double time)
             feed(c, f, time, h);
         s->fmu->time = c->origin;
         if (!set_inputs(s) || !s->fmu->step(s->fmu, whole) || !get_outputs(s) ||
-            (c->repeats && !refresh(c, s, time)))
+            (has_ends(c, s) && !refresh(c, s, time)))
             return fmu_failed(c, s);
         s->fmu->time = time;
     }
