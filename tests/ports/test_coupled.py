@@ -378,6 +378,19 @@ def test_feedthrough_is_as_exact_as_one_netlist(tmp_path: Path, gain: float, ver
     assert error(run, fine) <= 1.5 * apart(plain["time"], plain["vf#branch"], fine)
 
 
+@pytest.mark.parametrize("version", [2, 3])
+def test_feedthrough_that_no_fmu_declares_is_as_exact(tmp_path: Path, version: int) -> None:
+    """A model structure without dependencies, as pythonfmu writes it, says nothing of them."""
+    build(tmp_path, "Load", version)
+    (tmp_path / "rl.cir").write_text(f"* load\n{RL}Vf y 0 0\n.end\n")
+    (tmp_path / "load.toml").write_text(LOAD)
+    run, plain, fine = against_one_netlist(tmp_path, "R2 z 0 10", {"fmu.load.D": 10.0})
+    assert error(run, fine) <= 1.5 * apart(plain["time"], plain["vf#branch"], fine)
+    build(tmp_path, "Load", version, saves=False)
+    with pytest.raises(BadInput, match=r"Load\.fmu: load\.u to load\.y is fed through at once, so"):
+        here(tmp_path / "load.toml", {})
+
+
 @pytest.mark.parametrize("gain", [0.5, 10.0])
 def test_feedthrough_by_way_of_another_fmu_is_as_exact(tmp_path: Path, gain: float) -> None:
     """The source is from the second FMU, of which the scene tells first."""

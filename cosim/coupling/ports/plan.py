@@ -48,6 +48,7 @@ class Plan:
         """Outputs whose slopes are known, and held against what they do: FMU, port's ``from``, and
         the port's origin."""
         self._fed: list[tuple[int, Side, Variable]] = []  # index of a source, and what feeds it
+        self._read: list[tuple[Side, Variable]] = []  # outputs that ports lead on
         self._needs: dict[_Of, set[_Of]] = {}
         """Variables on which each variable depends without delay: by the FMUs' own declaration of
         feedthrough, and by ports from output to input."""
@@ -74,7 +75,8 @@ class Plan:
             if origin.kind == OUTPUT and origin.place >= side.first
         }
         """Places of outputs that feed an FMU which steps before their own FMU."""
-        through, circle = self._feedthrough(), _circle(self._needs)
+        needs = self._needs | self._seen()
+        through, circle = self._feedthrough(needs), _circle(needs)
         self.method = _method(scene, self.sides, through, circle)
         self.notes += _notes(scene, self.sides, self.method, through, circle)
         self.throughs = [*self._throughs()] if self.method == "redo" else []
@@ -104,12 +106,22 @@ class Plan:
         """Whether a port reads the command of ``[drive]``."""
         return any(port.origin == "drive" for port in self.scene.port)
 
-    def _feedthrough(self) -> str:
+    def _seen(self) -> dict[_Of, set[_Of]]:
+        """Feedthrough of outputs of which FMUs declare none, so that they may depend on all inputs:
+        as it is seen at the start."""
+        fed = dict.fromkeys((side, output) for side, output in self._read if output.real)
+        return {
+            (side.name, output.name): {(side.name, name) for name in side.answers(output)}
+            for side, output in fed
+            if output.name not in side.of.feedthrough
+        }
+
+    def _feedthrough(self, needs: dict[_Of, set[_Of]]) -> str:
         """An input from the circuit on which an output to the circuit depends without delay, also
-        through other FMUs, as they declare it: in words, or ""."""
+        through other FMUs: in words, or ""."""
         probed = {(side.name, into.name) for side in self.sides for into, _ in side.probed()}
         for _, side, output in self._fed:
-            for name, variable in sorted(_behind(self._needs, (side.name, output.name)) & probed):
+            for name, variable in sorted(_behind(needs, (side.name, output.name)) & probed):
                 return f"{name}.{variable} to {side.name}.{output.name}"
         return ""
 
@@ -153,8 +165,9 @@ class Plan:
         if port.scale == 1.0 and _alike(given) != _alike(taken) and not {given, taken} & _UNKNOWN:
             ends = f"{port.origin or port.probe} [{given}] to {port.source or port.to} [{taken}]"
             self.notes.append(f"a [[port]] leads {plain(ends)} without a scale.")
-        if side is not None:
+        if side is not None and output is not None:
             self._from.append((side, kept))
+            self._read.append((side, output))
             if kept.slope == _KNOWN:
                 self.told.append((side, str(port.origin), kept))
 

@@ -3,7 +3,6 @@
 import ctypes
 from collections.abc import Callable
 from ctypes import c_char_p, c_double, c_int64
-from functools import partial
 
 import numpy as np
 
@@ -27,7 +26,7 @@ from cosim.drive.pieces import Ahead
 from cosim.errors import SimulationFailed, plain
 from cosim.files.spill import Tape
 from cosim.scene import Scene
-from cosim.toolchain.serving import end_used, used
+from cosim.toolchain.serving import end_used
 
 _POINTS = 2048
 """Points that the blocks of the logs hold before they are emptied."""
@@ -145,7 +144,7 @@ class Run(ngspice.Leader):
         finally:
             self._attend()
             for side, state_of in zip(self.plan.sides, self.fmus, strict=False):
-                used.append(partial(side.close, state_of.state))
+                side.saved = state_of.state
         if state.status == FMU_FAILED:
             raise self._fmu_failure()
         self._refuse_what_is_said_wrongly()

@@ -5,15 +5,24 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from ctypes import c_double, c_uint32, c_void_p
+from functools import cached_property
 from itertools import accumulate
 from typing import Any
 
+import numpy as np
+
+from cosim.arrays import Array
 from cosim.coupling.loop.structures import PROBE, Feed, Fmu, Group, StrangerState, loop
 from cosim.coupling.ports.strangers import FUNCTIONS, Stranger, Variable
+from cosim.mechanics.fmi import Interface
 from cosim.scene import tables
+from cosim.toolchain.serving import used
 
 _ERROR = 3
 """Status of a call, in both FMI versions, from which on the instance must not be used."""
+
+_NUDGE = 1e-6
+"""Of an input, or of 1 if that is more."""
 
 
 class Side:
@@ -41,6 +50,9 @@ class Side:
         self._feeds: list[tuple[Variable, int, Any]] = []
         self._kept: list[Any] = []
         self._parameters = about.parameters
+        self.fmu = Fmu()
+        self.saved: int | None = None
+        """The address of its saved state, to be freed."""
 
     @property
     def varies(self) -> bool:
@@ -77,10 +89,39 @@ class Side:
             if into.real and feed.origin.kind == PROBE:
                 yield into, feed
 
+    @cached_property
+    def instance(self) -> Interface:
+        """The instance, ready to run."""
+        made = self.of.instance(self._parameters, self.name)
+        used.append(self._close)
+        return made
+
+    def answers(self, output: Variable) -> set[str]:
+        """The inputs with ports to which an output answers at once, seen by a nudge of each."""
+        raw, version = self.instance.raw, self.of.version
+
+        def get(of: Variable) -> Array:
+            size = () if version == 2 else (of.size,)
+            found = getattr(raw, f"get{of.type}")([of.reference], *size)
+            return np.array(found, np.float64)
+
+        def put(of: Variable, values: Array) -> None:
+            getattr(raw, f"set{of.type}")([of.reference], values.tolist())
+
+        found: set[str] = set()
+        with suppress(Exception):  # what fails here fails again in the run, which tells it
+            before = get(output)
+            for into in filter(lambda each: each.real, self.inputs):
+                given = get(into)
+                put(into, given + _NUDGE * np.maximum(np.abs(given), 1.0))
+                if not np.array_equal(get(output), before, equal_nan=True):
+                    found.add(into.name)
+                put(into, given)
+        return found
+
     def state(self, row: int, repeats: bool) -> Any:
-        """A new instance, ready to run, as ``ports.c`` takes it; its part of the row is at the
-        address ``row``. With ``repeats`` it can save and restore its state."""
-        self.instance = self.of.instance(self._parameters, self.name)
+        """The instance as ``ports.c`` takes it; its part of the row is at the address ``row``. With
+        ``repeats`` it can save and restore its state."""
         names = {"set_reals": "SetReal", "get_reals": "GetReal", "do_step": "DoStep"}
         if self.of.version == 3:
             names |= {"set_reals": "SetFloat64", "get_reals": "GetFloat64"}
@@ -162,13 +203,13 @@ class Side:
         array.used = len(groups)
         return array
 
-    def close(self, state: int | None) -> None:
+    def _close(self) -> None:
         """Free the instance and its saved state. After an error FMI allows no further calls, so the
         instance is then left as it is."""
         if self.fmu.status < _ERROR:
             with suppress(Exception):
-                if state:
-                    self.instance.free_state(c_void_p(state))
+                if self.saved:
+                    self.instance.free_state(c_void_p(self.saved))
                 self.instance.close()
 
 
