@@ -77,7 +77,7 @@ def load(source: "Scene | str | os.PathLike[str]", overrides: Overrides | None =
     Raises :class:`BadInput` with a sentence on each of the first things that are wrong.
     """
     if isinstance(source, Scene):
-        layers = [_Layer(source.origin, source.as_dict())]
+        layers = [_Layer(source.origin, _given(source))]
     else:
         if not isinstance(source, str | bytes | os.PathLike):
             raise BadInput(f"{messages.shown(source)}: must be a scene, or the name of one.")
@@ -111,7 +111,7 @@ def changed(scene: Scene, values: Mapping[str, float | int | str | None], origin
     try:
         made = Scene.model_validate(vars(scene) | _merge([_Layer("", below), layer]))
     except ValidationError:
-        made = _checked([_Layer(scene.origin, scene.as_dict()), layer], origin)
+        made = _checked([_Layer(scene.origin, _given(scene)), layer], origin)
     return made.of(scene.origin, scene.given)
 
 
@@ -178,11 +178,21 @@ def to_link(scene: Scene) -> str:
 
 
 def _plain_values(scene: Scene) -> dict[str, Any]:
-    """The values by "table.key", without ``settle`` and ``output_step`` where they are defaults."""
-    found = {f"{table}.{key}": v for table in TABLES for key, v in scene.table(table).items()}
-    for key in {"settle", "output_step"} - scene.run.model_fields_set:
-        del found[f"run.{key}"]
-    return found
+    """The values by "table.key" of :func:`_given`."""
+    given = _given(scene)
+    return {f"{table}.{key}": value for table in TABLES for key, value in given[table].items()}
+
+
+_FITTED = {"settle", "output_step"}
+"""Keys of [run] whose defaults depend on the drive and the duration."""
+
+
+def _given(scene: Scene) -> dict[str, Any]:
+    """The scene's tables, without those of :data:`_FITTED` that have their defaults."""
+    tables = scene.as_dict()
+    for key in _FITTED - scene.run.model_fields_set:
+        del tables["run"][key]
+    return tables
 
 
 def _spelt(value: Any) -> str:
@@ -411,7 +421,7 @@ def _tell_doubts(scene: Scene, layers: list[_Layer]) -> None:
     every = [
         key
         for key in KEYS.values()
-        if key.default is not None and key.name not in _TWINS.get(key.table, {})
+        if key.default is not None and key.name not in _FITTED | _TWINS.get(key.table, {}).keys()
     ]
     silent = [
         layer.builtin or all(key.name in layer.tables.get(key.table, {}) for key in every)

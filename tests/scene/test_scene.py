@@ -358,8 +358,10 @@ def test_a_given_settle_stays() -> None:
 
 def test_another_frequency_moves_only_a_settle_that_was_not_given() -> None:
     for own, settle in (([], 2.0 - 24 / 30.5), (["run.settle=1"], 1.0)):
-        scene = changed(load("paper", own), {"drive.frequency": 30.5}, "here")
-        assert scene.run.settle == pytest.approx(settle, rel=1e-12)
+        here, there = load("paper", own), {"drive.frequency": 30.5}
+        for scene in (changed(here, there, "here"), load(here, there)):
+            assert scene.run.settle == pytest.approx(settle, rel=1e-12)
+    assert load(load("paper"), {"run.duration": 0.02}).run.settle == 0.01
 
 
 def test_knobs_stand_for_values() -> None:
