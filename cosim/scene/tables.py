@@ -524,7 +524,7 @@ class Run(Table):
     settle: float = _number(
         *(0.8, "s", 0.0, 1e5),
         "Start of the averages; by default a multiple of 24, 12, 6 or 2 periods of the drive "
-        "before the end, about half of the duration",
+        "before the end, about half of the duration; of fewer than 4 periods the last one",
     )
     output_step: float = _number(5e-5, "s", 1e-9, 1e3, "Time between rows of the waveforms")
     shutter: float = _number(
