@@ -33,8 +33,6 @@ class Recording:
     name: str
     time: Array
     signals: dict[str, Array]
-    v_across: Array
-    """Horizontal velocity of the surface, m/s; NaN where it was not tracked."""
     notes: tuple[str, ...]
     """A sentence for each assumption, flaw and left-out column."""
     understood: dict[str, Any] = field(default_factory=dict)
@@ -48,7 +46,6 @@ class Recording:
             self,
             time=self.time[chosen] - self.time[chosen][0],
             signals={name: values[chosen] for name, values in self.signals.items()},
-            v_across=self.v_across[chosen],
         )
 
     def told(self) -> list[str]:
@@ -99,7 +96,6 @@ def read_recording(path: Path, asked: str = "") -> Recording:
             where = f"{plain(path)}: column {plain(table.headers[name], 40)}"
             raise BadInput(f"{where}: it has fewer than two values.")
     notes += (*flaws(time, signals, table.headers),)
-    across = table.columns.get("v_across_surface", np.full(count, np.nan))
     columns = {
         name: {"header": column.header, "unit": column.unit, "assumed": column.assumed}
         | {"missing": int(np.isnan(table.columns[name]).sum())}
@@ -112,7 +108,7 @@ def read_recording(path: Path, asked: str = "") -> Recording:
         "gaps": _gaps(time),
         "columns": columns,
     }
-    return Recording(plain(path.stem), time, signals, across, notes, understood)
+    return Recording(plain(path.stem), time, signals, notes, understood)
 
 
 def _gaps(time: Array) -> list[str]:

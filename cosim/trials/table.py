@@ -63,12 +63,12 @@ BODIES = {"p": "surface", "o": "part", "s": "plate"}
 TRIALS = {"t": "time"} | {
     f"{quantity}{letter}": f"{name}_{body}"
     for letter, body in BODIES.items()
-    for quantity, name in (("z", "z"), ("vz", "v"), ("az", "a"), ("vx", "v_across"))
+    for quantity, name in (("z", "z"), ("vz", "v"), ("az", "a"))
 }
 """Columns of the published trials."""
 PUBLISHED, BESIDE = {"t", "zp", "zo"}, {"xp", "xo", "zs"}
 """A table with all of the first and one of the second is a published trial, and needs no units."""
-UNUSED = {f"{quantity}{letter}" for quantity in ("x", "ax") for letter in BODIES}
+UNUSED = {f"{quantity}{letter}" for quantity in ("x", "vx", "ax") for letter in BODIES}
 """Columns of the published trials that have no part in the vertical motion."""
 
 TRACKS = {

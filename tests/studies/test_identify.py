@@ -95,9 +95,7 @@ def _trial(time: Array) -> Any:
 
     motion = np.sin(2 * np.pi * 20.0 * time) * 1e-3
     signals = {"z_surface": motion, "v_surface": np.gradient(motion, time)}
-    return measured(
-        Recording("any", time, signals, time * np.nan, ()), Path("any.csv"), read_space()
-    )
+    return measured(Recording("any", time, signals, ()), Path("any.csv"), read_space())
 
 
 def write(folder: Path, label: str, columns: dict[str, Array]) -> None:

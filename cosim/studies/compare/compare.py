@@ -19,7 +19,6 @@ from cosim.studies.compare.scores import (
     Signals,
     both_sides,
     explained,
-    horizontal_share,
     mean_distance,
     scores,
 )
@@ -183,7 +182,6 @@ def measure(
     numbers = [
         *scores(recording, simulated, repeats),
         *both_sides(recording, simulated, (repeats, period or repeats)),
-        *filter(None, [horizontal_share(recording)]),
         Number("rate", 1.0 / row, "1/s", "rows of the recording in a second, the median"),
         Number("start", start, "s", "time of the run that is laid over the recording's first row"),
     ]

@@ -160,14 +160,3 @@ def _slipping(signals: Signals) -> float | None:
     apart = np.abs(signals["v_part"] - signals["v_surface"])
     known = apart[np.isfinite(apart)]
     return float(np.mean(known > STICKS)) if len(known) else None
-
-
-def horizontal_share(recording: Recording) -> Number | None:
-    """The share of the surface's measured motion that is horizontal; the simulation has none."""
-    across, along = recording.v_across, recording.signals.get("v_surface", np.array(np.nan))
-    known = np.isfinite(across) & np.isfinite(along)
-    squares = [float((each[known] ** 2).sum()) for each in (across, along) if known.any()]
-    if not sum(squares):
-        return None
-    words = "share of the surface's measured mean square velocity that is horizontal"
-    return Number("horizontal_share", squares[0] / sum(squares), "1", words)
