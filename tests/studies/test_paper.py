@@ -166,9 +166,9 @@ def test_the_conditions():
     assert formulas.least_peak_acceleration(0.7, formulas.least_force_ratio(0.7)) == pytest.approx(
         formulas.least_peak_acceleration_at_any_force()
     )
-    assert all(formulas.conditions(0.7, 0.6, 10 * G, 5.0).values())
-    assert not formulas.conditions(0.7, 0.6, 10 * G, 1.4)["held_at_rest"]
-    assert not formulas.conditions(0.7, 0.6, 10 * G, 12.9)["shaken_loose"]
+    for f_n, words in ((1.4, "a surface at rest holds"), (12.9, "shakes the part loose")):
+        with pytest.raises(BadInput, match=words):
+            Transport(**{**FIGURE_3, "f_n": f_n}).coefficients()
 
 
 # Against the simulation

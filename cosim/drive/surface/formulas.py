@@ -118,19 +118,6 @@ def least_peak_acceleration_at_any_force(gravity: float = GRAVITY) -> float:
     return 2.0 * gravity
 
 
-def conditions(
-    mu_s: float, mu_k: float, a_max: float, f_n: float, gravity: float = GRAVITY
-) -> dict[str, bool]:
-    """Whether each condition for transport upwards, and for its robust variant, is fulfilled."""
-    loose = a_max > least_peak_acceleration(mu_s, f_n, gravity)
-    return {
-        "held_at_rest": f_n > least_force_ratio(mu_s),
-        "shaken_loose": loose,
-        "peak_above_2g": a_max > least_peak_acceleration_at_any_force(gravity),
-        "robust_possible": loose and mu_k * f_n > 1.0,
-    }
-
-
 # The mapping to horizontal transport
 
 

@@ -126,7 +126,6 @@ def collect(case: Transport) -> dict[str, Any]:
             "least_force_ratio": formulas.least_force_ratio(mu_s),
             "least_peak_acceleration": formulas.least_peak_acceleration(mu_s, f_n, gravity),
             "least_peak_acceleration_at_any_force": least,
-            "fulfilled": formulas.conditions(mu_s, mu_k, case.a_max, f_n, gravity),
         },
         "horizontal_equivalent": {
             "up": formulas.horizontal_equivalent(mu_s, mu_k, f_n)._asdict(),
