@@ -16,7 +16,7 @@ from io import TextIOWrapper
 from pathlib import Path
 from typing import Any, NoReturn
 
-from cosim.cli import new, simulation, studies
+from cosim.cli import simulation, studies
 from cosim.cli.command import Command, add_commands
 from cosim.errors import BadInput, CosimError, Note, SimulationFailed, plain, printable
 from cosim.files.reader import watched
@@ -70,8 +70,7 @@ def _parser(arguments: list[str] | None) -> argparse.ArgumentParser:
         description="Runs a vibrating gripper: its circuit in ngspice, its mechanics in an FMU.",
     )
     parser.add_argument("--version", action="version", version=f"cosim {__version__}")
-    commands = [*simulation.COMMANDS, *new.COMMANDS, _COMPLETION]
-    commands += studies.commands()
+    commands = [*simulation.COMMANDS, *studies.commands(), _COMPLETION]
     add_commands(parser, sorted(commands, key=lambda one: one.name), arguments, "COMMAND")
     return parser
 
