@@ -50,10 +50,8 @@ def table(data: xr.Dataset) -> str:
         lines.append(f"  motion at points at random: {data.attrs[MOTIONS]}")
     lines += _judgement(data) if JUDGED in data else []
     lines += [f"  {n} failed: {reason}" for reason, n in reasons.most_common(MOST_REASONS)]
-    if len(reasons) > MOST_REASONS:
-        lines.append(
-            f"  and for {len(reasons) - MOST_REASONS} more reasons: see {FAILURE} in sweep.nc"
-        )
+    if (more := len(reasons) - MOST_REASONS) > 0:
+        lines.append(f"  and for {more} more reasons: see {FAILURE} in sweep.nc")
     return "\n".join(lines)
 
 

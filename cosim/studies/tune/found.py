@@ -136,10 +136,8 @@ class Tuning:
             transform=path_axis.get_xaxis_transform(),
         )  # fmt: skip
         path_axis.set(xlabel="run", ylabel=ylabel)
-        words = "Every run, and the best so far" + (
-            f"; {len(failed)} failed or too hot (×)" if len(failed) else ""
-        )
-        path_axis.set_title(words, loc="left", fontsize=10.5)
+        lost = f"; {len(failed)} failed or too hot (×)" if len(failed) else ""
+        path_axis.set_title(f"Every run, and the best so far{lost}", loc="left", fontsize=10.5)
 
         turns = 100 * np.array([-TURN, 0.0, TURN])
         styles = [(color, style) for style in ("-", "--", ":") for color in COLORS]

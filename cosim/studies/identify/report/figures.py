@@ -61,9 +61,7 @@ def overlays(found: Solved) -> Picture:
         axis.set_xlabel("time [ms]")
     legend(figure, axes[:1], loc="outside upper right", ncols=2)
     told = [1.0 - rows[trial.label][VELOCITY] ** 2 for trial in found.trials]
-    whole = (
-        f"{percent(min(told))} to {percent(max(told))}" if len(told) > 1 else f"{percent(told[0])}"
-    )
+    whole = " to ".join(dict.fromkeys(map(percent, (min(told), max(told)))))
     headline(figure, f"One rig explains {whole} of the variance of the surface's velocity")
     return figure
 
@@ -127,12 +125,8 @@ def rigs(found: Solved) -> Picture:
         if space.log[space.names.index(name)]:
             axis.set_xscale("log")
             low, high = axis.get_xlim()
-            many = high > 5.0 * low
-            axis.xaxis.set_major_locator(
-                LogLocator(subs=(1.0, 2.0, 5.0) if high < 100.0 * low else (1.0,))
-                if many
-                else MaxNLocator(4)
-            )
+            decades = LogLocator(subs=(1.0, 2.0, 5.0) if high < 100.0 * low else (1.0,))
+            axis.xaxis.set_major_locator(decades if high > 5.0 * low else MaxNLocator(4))
             axis.xaxis.set_major_formatter("{x:.3g}")
             axis.xaxis.set_minor_formatter(NullFormatter())
         else:
