@@ -24,8 +24,7 @@ def test_what_is_declared_is_what_the_function_takes(study: Study) -> None:
     """Its parameters, and the defaults that the help names."""
     parameters = inspect.signature(study.function).parameters
     assert study.function.__doc__
-    options = (option for option in study.options if option is not SHOW and not option.prints)
-    given = {option.argument for option in options}
+    given = {option.argument for option in study.options if option is not SHOW}
     given |= {"out"} if study.command and study.saves else set()
     given |= set(study.tells)
     assert given <= set(parameters)
