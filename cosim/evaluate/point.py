@@ -94,6 +94,14 @@ def point(base: Scene, values: Settings, whole_periods: bool) -> Scene:
     few_rows = float(values.get("run.duration", base.run.duration)) / 2.0
     if few_rows != base.run.output_step:
         values = {"run.output_step": few_rows, **values}
+    return moved(base, values, whole_periods)
+
+
+def moved(base: Scene, values: Settings, whole_periods: bool) -> Scene:
+    """The scene with other values; in whole periods, it settles no shorter than ``base`` unless its
+    duration is another. Raises BadInput."""
+    if whole_periods and "run.duration" not in values:
+        values = {"run.settle": base.run.settle, **values}
     scene = changed(base, values, "--over")
     return in_whole_periods(scene) if whole_periods else scene
 

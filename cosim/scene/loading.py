@@ -108,6 +108,8 @@ def changed(scene: Scene, values: Mapping[str, float | int | str | None], origin
     layer = _Layer(origin, _tables(values.items(), origin))
     # A table that stays the same is not checked again, but the scene as a whole is.
     below = {name: scene.table(name) for name in layer.tables}
+    if "run" in below:
+        below["run"] = _run_as_given(scene)
     try:
         made = Scene.model_validate(vars(scene) | _merge([_Layer("", below), layer]))
     except ValidationError:
@@ -189,10 +191,12 @@ _FITTED = {"settle", "output_step"}
 
 def _given(scene: Scene) -> dict[str, Any]:
     """The scene's tables, without those of :data:`_FITTED` that have their defaults."""
-    tables = scene.as_dict()
-    for key in _FITTED - scene.run.model_fields_set:
-        del tables["run"][key]
-    return tables
+    return scene.as_dict() | {"run": _run_as_given(scene)}
+
+
+def _run_as_given(scene: Scene) -> dict[str, Any]:
+    absent = _FITTED - scene.run.model_fields_set
+    return {key: value for key, value in scene.table("run").items() if key not in absent}
 
 
 def _spelt(value: Any) -> str:

@@ -106,6 +106,14 @@ def test_frequencies_last_whole_periods() -> None:
     assert abs(broken - known) > 1e-3 * abs(known)
 
 
+def test_durations_are_averaged_over_whole_periods() -> None:
+    """Motion that repeats has one mean; over three periods and a fifth it is 17 % off."""
+    long = sweep("ideal-current", {"drive.offset": [-0.783]}, {"run.duration": 3.0}, workers=1)
+    data = sweep("ideal-current", {"run.duration": [0.8, 1.0]}, workers=1)
+    assert data.failure.values.tolist() == ["", ""]
+    assert data.v_average.values == pytest.approx(float(long.v_average[0]), rel=1e-4)
+
+
 def test_failures_cost_only_themselves(tmp_path: Path) -> None:
     """Scenes that cannot be, mechanics that give up and a circuit without a solution."""
     netlist = tmp_path / "floating.cir"

@@ -15,10 +15,10 @@ import xarray as xr
 from cosim.errors import BadInput, Note, plain
 from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.keys import refuse_unknown
-from cosim.evaluate.point import Number, Settings, in_whole_periods
+from cosim.evaluate.point import Number, Settings, moved
 from cosim.files.atomic import whole
 from cosim.mechanics import package as fmu
-from cosim.scene import Overrides, Scene, changed, load
+from cosim.scene import Overrides, Scene, load
 from cosim.scene.messages import suggestion
 from cosim.simulation.checks import motion
 from cosim.studies.sweep import dataset
@@ -179,9 +179,7 @@ def _keep(
 
     def kept(_: Scene, number: int, progress: Progress) -> None:
         # The scene that the evaluator passes records no waveforms.
-        point = changed(scene, design.point(number), "--over")
-        if design.changes_frequency:
-            point = in_whole_periods(point)
+        point = moved(scene, design.point(number), design.changes_frequency)
         result = simulate(point, progress)
         if unknown := [name for name in names if name not in result.columns]:
             known = ", ".join(result.columns)
@@ -202,8 +200,8 @@ def _motions(scene: Scene, design: Design, data: xr.Dataset) -> dict[str, str]:
 
     def at(number: int) -> tuple[str, str, str]:
         """The kind of motion at a point; its description; a warning if the mean holds the start."""
-        point = changed(scene, {**design.point(number), "run.solver": "fmu"}, "--over")
-        point = in_whole_periods(point) if design.changes_frequency else point
+        values = {**design.point(number), "run.solver": "fmu"}
+        point = moved(scene, values, design.changes_frequency)
         summary = motion(point, lambda _: None)
         summary["v_average"] = float(v[number])
         return summary.get("motion", ""), motion_in_words(summary), of_the_start(point, summary)

@@ -16,7 +16,7 @@ from cosim.circuit.heat import DRIVE_RANGE_HEAT, LIFT, heat_limit
 from cosim.errors import BadInput, Note, SimulationFailed, plain
 from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.keys import FREQUENCIES, numeric_key, refuse_unknown
-from cosim.evaluate.point import Number, Outcome, Settings, in_whole_periods
+from cosim.evaluate.point import Number, Outcome, Settings, moved
 from cosim.scene import Overrides, Scene, changed, firmware, load
 from cosim.scene.messages import bad, check_whole, shown, suggestion
 from cosim.scene.tables import COMMANDS, MOST_CORNERS
@@ -163,8 +163,7 @@ def tune(
                 if not bench.resumed:
                     bench.forget()  # a refused call leaves nothing to resume
                 raise
-            tuned = changed(base, {**best.values, **judge}, "tune")
-            tuned = in_whole_periods(tuned) if whole else tuned
+            tuned = moved(base, {**best.values, **judge}, whole)
             ran_ahead = (run.value for run in ahead if judge and run.values == best.values)
             tunings.append(
                 Tuning(
