@@ -214,6 +214,8 @@ def _read(source: str, origin: str, builtin: list[str]) -> dict[str, Any]:
     """The content of a scene file."""
     if how := _NO_SCENES.get(Path(source).suffix):
         raise BadInput(f"{origin}: must be a scene, a .toml: {how}.")
+    if os.path.isfile(inside := os.path.join(source, "scene.toml")):
+        raise BadInput(f"{origin}: must be a scene, a .toml: this run's is {plain(inside)}.")
     try:
         return toml.read(source)
     except reader.Refused as refused:

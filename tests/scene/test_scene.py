@@ -244,6 +244,12 @@ def test_what_a_scene_names_is_no_scene(file: str, cure: str) -> None:
         load(file)
 
 
+def test_of_a_runs_folder_the_scene_is_named(tmp_path: Path) -> None:
+    file = written(tmp_path, "").rename(tmp_path / "scene.toml")
+    with pytest.raises(BadInput, match=f"this run's is {re.escape(str(file))}"):
+        load(tmp_path)
+
+
 def test_all_unknown_names_are_told_at_once(tmp_path: Path) -> None:
     path = written(tmp_path, "[drive]\nfrequncy = 20\namplitud = 3\n[cirucit]\n")
     with pytest.raises(BadInput) as caught:
