@@ -93,8 +93,8 @@ def _unchecked(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) 
     """Quick tests run a scene alone, but those marked "checked": a run's checks make others, in
     processes of their own, which take most of the time of a short run's test."""
     if not any(map(request.node.get_closest_marker, ("checked", "slow"))):
-        monkeypatch.setattr(checks, "checked", lambda scene, run, strict: run())
-        monkeypatch.setattr(checks, "checked_ports", lambda scene, run: run())
+        monkeypatch.setattr(checks, "checked", lambda scene, run, *_: run())
+        monkeypatch.setattr(checks, "checked_ports", lambda scene, run, *_: run())
 
 
 @pytest.fixture

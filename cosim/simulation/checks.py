@@ -16,7 +16,7 @@ Not detected: several motions that these starts do not separate; a kind of motio
 the simpler circuit, near a border between two kinds; chaos that dies out before the averages begin.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
@@ -33,6 +33,7 @@ from cosim.simulation.elsewhere import one_run
 from cosim.simulation.fidelity import LEAST, Fidelity, relative_error
 from cosim.simulation.here import few_rows, simulate_here
 from cosim.toolchain.threads import Progress, threads
+from cosim.waveforms.report import asked_for
 from cosim.waveforms.result import Result
 
 COARSER = 3.5
@@ -49,6 +50,14 @@ HARDLY = 0.7
 """Share of a run's steps from which on those of its coarser run are hardly fewer: edges of the
 netlist's own sources rule them, and both runs err alike there. It takes a smaller tolerance to show
 this, which then costs few more steps."""
+
+FAR = 0.05
+"""Difference of a user's netlist in its coarser run, over v_average or a port's rms, from which on
+that run tells nothing: its steps pass over what the circuit does, as a smooth comparator between
+two edges of its carrier, and the scene's own may, too."""
+
+WRONG = 0.2
+"""Twice the error of v_average, relative, above which a note says what to do."""
 
 STRICT = 2.4
 """Factor by which steps of the first finer run of a strict check are shorter; squared: second."""
@@ -79,9 +88,11 @@ MOST_PERIODS = 8
 """Most periods of the drive after which motion is recognised to repeat."""
 
 
-def checked(scene: Scene, run: Callable[[], Result], strict: bool = False) -> Result:
+def checked(
+    scene: Scene, run: Callable[[], Result], progress: Progress, strict: bool = False
+) -> Result:
     """The result of ``run``, which runs ``scene``, with two additions to its summary: the error of
-    v_average, m/s, and the kind of motion.
+    v_average, m/s, and the kind of motion. ``progress`` is that of runs after it.
 
     With ``strict`` the error comes from two finer runs, and v_average of three more starts is
     added, all on the scene's own circuit, which costs ten times as much. Raises what ``run``
@@ -90,51 +101,90 @@ def checked(scene: Scene, run: Callable[[], Result], strict: bool = False) -> Re
     load(3)
     with threads(2) as (pool, going):
 
-        def mean(of: Scene | None) -> float | None:
-            return None if of is None else _numbers(of, going).get("v_average")
+        def one(of: Scene | None) -> dict[str, Any]:
+            return {} if of is None else _numbers(of, going)
 
         asked = [_steps(scene, COARSER)]
         if strict:
             asked = [_steps(scene, 1.0 / STRICT**k) for k in (1, 2)]
             asked += [_started(scene, ahead) for ahead in AHEAD]
-        others = [pool.submit(mean, each) for each in asked]
+        others = [pool.submit(one, each) for each in asked]
         kind = pool.submit(motion, scene, going)
         result = run()
-        own, told = result.summary["v_average"], [other.result() for other in others]
+        own, told = result.summary, [other.result() for other in others]
+        scale = max(abs(own["v_average"]), LEAST)
+        if scene.rung.own_netlist and not strict:
+            told = _judges(scene, own, told[0], {"v_average": scale}, progress)
         found: dict[str, Any] = kind.result()
     if strict:
-        fine, finest, *from_elsewhere = told
-        error = None if fine is None or finest is None else max(abs(own - finest), abs(own - fine))
-        means = [value for value in from_elsewhere if value is not None]
-        found["v_average_other_starts"] = means
-    else:
-        least = LEAST_TOLD * abs(own) if scene.rung.ngspice else 0.0
-        error = None if told[0] is None else max(abs(own - told[0]), least)
-    told_of = {"v_average_error": error, **found}
-    return replace(result, summary=result.summary | told_of)
+        told, starts = told[:2], told[2:]
+        found["v_average_other_starts"] = [each["v_average"] for each in starts if each]
+    least = LEAST_TOLD if scene.rung.ngspice and not strict else 0.0
+    error = _errors(own, told, ["v_average"], least).get("v_average")
+    if scene.rung.own_netlist and error is not None and 2.0 * error > WRONG * scale:
+        found["notes"] = [*own["notes"], _too_long(scene, error)]
+    return replace(result, summary=own | {"v_average_error": error, **found})
 
 
-def checked_ports(scene: Scene, run: Callable[[], Result]) -> Result:
+def _too_long(scene: Scene, error: float) -> str:
+    """A note on an ``error`` (m/s) of the user's netlist by its steps."""
+    shorter = _longer(scene, 1.0 / COARSER).circuit
+    return (
+        f"the steps of ngspice may move v_average by {2e3 * error:.2g} mm/s, more than a fifth of "
+        "it: either they are too long for this netlist (try "
+        f"circuit.reltol = {shorter.reltol:.1g} and circuit.max_step = {shorter.max_step:.1g}), or "
+        "the motion is chaotic."
+    )
+
+
+def checked_ports(scene: Scene, run: Callable[[], Result], progress: Progress) -> Result:
     """The result of ``run``, which runs a scene with ports, with an error ``NAME.mean_error`` of
-    each mean: the difference to a run with all steps COARSER times as long, or as short where a
-    scene does not allow such long ones; the greater one where a sharper run is needed, too. No
-    error where the first one fails. Raises what ``run`` raises.
+    each mean that the runs of :func:`_judges` know. ``progress`` is that of runs after it. Raises
+    what ``run`` raises.
     """
     with threads(1) as (pool, going):
         other = pool.submit(_numbers, _longer(scene, COARSER), going)
         result = run()
-        own, told = result.summary, [other.result()]
-        if HARDLY < told[0].get("circuit_steps", 0) / max(1, own["circuit_steps"]) < 1.0 / HARDLY:
-            sharper = scene.having(circuit={"reltol": scene.circuit.reltol / COARSER**3})
-            told.append(pool.submit(_numbers, sharper, going).result())
-    errors = {
-        f"{name}_error": max(
-            LEAST_TOLD * abs(value), *(abs(value - each[name]) for each in told if name in each)
-        )
-        for name, value in own.items()
-        if name.endswith(".mean") and name in told[0]
+        own = result.summary
+        # Outputs that nothing joins may count an FMU's own steps.
+        named = (name for name in asked_for(scene) if f"{name}.rms" in own)
+        scales = {f"{name}.mean": own[f"{name}.rms"] for name in named}
+        told = _judges(scene, own, other.result(), scales, progress)
+    errors = _errors(own, told, (name for name in own if name.endswith(".mean")), LEAST_TOLD)
+    return replace(result, summary=own | {f"{name}_error": errors[name] for name in errors})
+
+
+def _judges(
+    scene: Scene,
+    own: dict[str, Any],
+    longer: dict[str, Any],
+    scales: Mapping[str, float],
+    progress: Progress,
+) -> list[dict[str, Any]]:
+    """The summaries whose differences to ``own`` tell the errors of the numbers in ``scales``, for
+    a netlist of the user's. That is the one with all steps COARSER times as ``longer``. Where it is
+    FAR off, in units of the scales, one with all steps as much shorter takes its place; where both
+    take HARDLY other steps, one of a smaller tolerance stands beside it."""
+    far = any(abs(own[name] - longer.get(name, own[name])) > FAR * scales[name] for name in scales)
+    shorter = _longer(scene, 1.0 / COARSER)
+    if far and shorter != _longer(scene, COARSER):
+        return [_numbers(shorter, progress) or longer]
+    if HARDLY < longer.get("circuit_steps", 0) / max(1, own["circuit_steps"]) < 1.0 / HARDLY:
+        sharper = scene.having(circuit={"reltol": scene.circuit.reltol / COARSER**3})
+        return [longer, *filter(None, [_numbers(sharper, progress)])]
+    return [longer]
+
+
+def _errors(
+    own: dict[str, Any], others: list[dict[str, Any]], names: Iterable[str], least: float
+) -> dict[str, float]:
+    """The errors of the numbers of ``own`` that all ``others`` have: the greatest differences, at
+    least the share ``least`` of the number."""
+    return {
+        name: max(least * abs(own[name]), *(abs(own[name] - each[name]) for each in others))
+        for name in names
+        if all(name in each for each in others)
     }
-    return replace(result, summary=own | errors)
 
 
 def _numbers(scene: Scene, going: Progress) -> dict[str, Any]:

@@ -68,7 +68,7 @@ def simulate(
         if checks == "usual":
             from cosim.simulation.checks import checked_ports
 
-            return checked_ports(scene, lambda: one_run(scene, progress))
+            return checked_ports(scene, lambda: one_run(scene, progress), progress)
         return one_run(scene, progress)
     if scene.run.solver == "fast":
         from cosim.simulation.fast import simulate_fast
@@ -80,7 +80,7 @@ def simulate(
     if checks != "none":
         from cosim.simulation.checks import checked
 
-        return checked(scene, partial(again, scene), checks == "strict")
+        return checked(scene, partial(again, scene), progress, checks == "strict")
     if scene.coupling.method == "auto" and scene.rung.ngspice:
         from cosim.simulation.choose_steps import simulate_within_tolerance
 

@@ -1,7 +1,10 @@
 """What runs with ports tell of the errors of their means, against the means of finer steps."""
 
+from pathlib import Path
+
 import pytest
 
+from cosim.files.resources import circuits
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from tests.simulation.test_checks import within_twice_the_told
@@ -28,3 +31,21 @@ def test_edges_that_two_runs_meet_alike_do_not_hide_the_error() -> None:
         assert abs(found[name] - true[name]) > 1e-4 * abs(true[name])
         assert within_twice_the_told(found[name], found[f"{name}_error"], true[name])
         assert found[f"{name}_error"] < 20.0 * abs(found[name] - true[name])
+
+
+def test_a_comparator_that_longer_steps_pass_over_does_not_hide_the_error(tmp_path: Path) -> None:
+    """Both runs erred alike: 3 rad/s were told for 25, of 72."""
+    text = (circuits() / "ports" / "dc_motor.cir").read_text(encoding="utf-8")
+    gate = next(line for line in text.splitlines() if line.startswith("Bgate"))
+    carrier = "Vtri tri 0 SIN(0 1 30k)\nBgate gate 0 V=0.5+0.5*tanh(200*(0.5-V(tri)))"
+    path = tmp_path / "sine.cir"
+    path.write_text(text.replace(gate, carrier))
+    own = {"circuit.netlist": str(path), "circuit.max_step": 2e-5}
+    own |= {"run.duration": 0.04, "run.settle": 0.02}
+    found = simulate(load("dc-motor", own), checks="usual").summary
+    true = simulate(load("dc-motor", own | {"circuit.max_step": 1e-6, "circuit.reltol": 1e-7}))
+    for name in ("gear.speed.mean", "gear.angle.mean", "i(Vemf).mean"):
+        told, off = found[f"{name}_error"], abs(found[name] - true.summary[name])
+        assert off > 0.2 * abs(true.summary[name])
+        assert within_twice_the_told(found[name], told, true.summary[name])
+        assert told < 20.0 * off

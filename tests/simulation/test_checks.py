@@ -120,6 +120,27 @@ def test_a_netlist_of_ones_own() -> None:
     assert "motion" not in found  # there is no simpler circuit of it
 
 
+def test_a_comparator_that_longer_steps_pass_over(tmp_path: Path) -> None:
+    """The example, with a carrier instead of averaged duties: 2 mm/s were told for 16."""
+    text = (EXAMPLES / "h_bridge.cir").read_text(encoding="utf-8")
+    for sign in "+-":
+        averaged, duty = f"(1{sign}V(duty))", f"(1+tanh(100*({sign}V(duty)-V(carrier))))"
+        assert averaged in text
+        text = text.replace(averaged, duty)
+    path = tmp_path / "class_d.cir"
+    path.write_text(text.replace("Bduty", "Vcarrier carrier 0 SIN(0 1 17k)\nBduty", 1))
+    own: dict[str, Any] = {"circuit.model": "file", "circuit.netlist": str(path)}
+    own |= {"run.duration": 0.1, "run.settle": 0.05}
+    found = simulate(load("reference", own), checks="usual").summary
+    fine = {"circuit.max_step": 1e-6, "circuit.reltol": 1e-6}
+    true = simulate(load("reference", own | fine)).summary["v_average"]
+    off, told = abs(found["v_average"] - true), found["v_average_error"]
+    assert within_twice_the_told(found["v_average"], told, true)
+    assert told < 20.0 * off + 1e-4 * abs(true)
+    (note,) = (each for each in found["notes"] if "the steps of ngspice may move" in each)
+    assert (off > 0.2 * abs(true)) and "try circuit.reltol = 2e-07" in note
+
+
 def kind(scene: str, contact: str = "compliant", **drive: Any) -> dict[str, Any]:
     settings = {f"drive.{key}": value for key, value in drive.items()}
     settings["mechanics.contact"] = contact
