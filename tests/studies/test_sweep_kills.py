@@ -14,6 +14,7 @@ from pathlib import Path
 
 import psutil
 import pytest
+import xarray as xr
 
 from cosim.cli.main import main
 from cosim.studies.sweep.run import sweep
@@ -109,6 +110,8 @@ def test_interrupted(scene: str, tmp_path: Path) -> None:
     assert process.returncode == 130 and last == "cosim: interrupted."
     told = re.search(r"cosim: (\d+) of 1000 points are kept in .*the same command", before[-1])
     assert told is not None and 20 <= int(told[1]) <= kept(tmp_path)
+    with xr.open_dataset(tmp_path / "sweep.nc", engine="scipy") as data:
+        assert int(told[1]) <= int(data.v_average.notnull().sum()) <= kept(tmp_path)
     _, alive = psutil.wait_procs(workers, timeout=120)
     assert not alive
 

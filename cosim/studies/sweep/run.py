@@ -5,7 +5,7 @@ import time
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -144,17 +144,22 @@ def _sweep(
         due = time.monotonic() + _REFRESH
         left = design.alike(n for n in range(total) if n not in before)
         points = ((n, design.point(n)) for n in left)
-        for done, (number, outcome) in enumerate(bench.run(points), len(before) + 1):
-            numbers.add(number, outcome)
-            progress(done, numbers.failed, total)
-            if time.monotonic() >= due:
-                began = time.monotonic()
-                try:
-                    refreshed()
-                except BadInput as error:  # the disk may have room again at the end
-                    warnings.warn(f"{error} The sweep goes on.", Note, stacklevel=2)
-                ended = time.monotonic()
-                due = ended + max(_REFRESH, _RARELY * (ended - began))
+        try:
+            for done, (number, outcome) in enumerate(bench.run(points), len(before) + 1):
+                numbers.add(number, outcome)
+                progress(done, numbers.failed, total)
+                if time.monotonic() >= due:
+                    began = time.monotonic()
+                    try:
+                        refreshed()
+                    except BadInput as error:  # the disk may have room again at the end
+                        warnings.warn(f"{error} The sweep goes on.", Note, stacklevel=2)
+                    ended = time.monotonic()
+                    due = ended + max(_REFRESH, _RARELY * (ended - began))
+        except KeyboardInterrupt:
+            with suppress(BadInput):  # what is done stands in the store, too
+                refreshed()
+            raise
         if scene.run.solver == "fast":
             for number, outcome in bench.run(_judged(design, numbers)):
                 numbers.judge(number, outcome)
