@@ -102,7 +102,7 @@ def checked(
     with threads(2) as (pool, going):
 
         def one(of: Scene | None) -> dict[str, Any]:
-            return {} if of is None else _numbers(of, going)
+            return {} if of is None else _numbers(few_rows(of), going)
 
         asked = [_steps(scene, COARSER)]
         if strict:
@@ -143,7 +143,7 @@ def checked_ports(scene: Scene, run: Callable[[], Result], progress: Progress) -
     what ``run`` raises.
     """
     with threads(1) as (pool, going):
-        other = pool.submit(_numbers, _longer(scene, COARSER), going)
+        other = pool.submit(_numbers, few_rows(_longer(scene, COARSER)), going)
         result = run()
         own = result.summary
         # Outputs that nothing joins may count an FMU's own steps.
@@ -187,10 +187,11 @@ def _errors(
     }
 
 
-def _numbers(scene: Scene, going: Progress) -> dict[str, Any]:
-    """The summary of a run of ``scene`` by itself; empty where it fails."""
+def _numbers(scene: Scene, progress: Progress) -> dict[str, Any]:
+    """The summary of a run of ``scene`` by itself, which tells its progress at its rows; empty
+    where it fails."""
     with suppress(CosimError):
-        return one_run(few_rows(scene), going, alone=True).summary
+        return one_run(scene, progress, alone=True).summary
     return {}
 
 
