@@ -333,6 +333,7 @@ typedef struct Ports {
     double macro_step;         /* s; 0: each accepted step ends on a communication point */
     int64_t fixed;             /* whether an FMU takes no other step than that one */
     double duration, after_jump;
+    int64_t ends;              /* whether FMUs take the ends of their inputs; see has_end() */
     double drive_charge;       /* V s; the drive's integral since the communication point */
     double jumped;             /* s; the last jump, of the drive or of an FMU */
     double time, origin, end;  /* s; last accepted point; last and next communication point */

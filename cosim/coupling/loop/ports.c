@@ -237,11 +237,14 @@ static int set_inputs(Stranger *s)
                                             s->n_input_slopes, s->input_rates);
 }
 
-/* What is fed through does not lag where an FMU takes the end of a step for a mean over it. From the
-   circuit it does so only where steps are repeated: the circuit learns of the answer a step late. */
+/* What is fed through does not lag where an FMU takes the end of a step for a mean over it. Where steps
+   are not repeated, that end is known of the drive and of FMUs that have stepped already; the circuit
+   learns of the answer a step late, and in an algebraic loop what comes back would grow. */
 static int has_end(const Ports *c, const Feed *f)
 {
-    return c->repeats || (f->origin.kind != FROM_PROBE && f->feed != END);
+    const int known = f->origin.kind == FROM_DRIVE ||
+                      (f->origin.kind == FROM_OUTPUT && !c->backs[f->origin.place].is_one);
+    return c->repeats || (c->ends && known && f->feed != END);
 }
 
 static int has_ends(const Ports *c, const Stranger *s)

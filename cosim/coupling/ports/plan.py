@@ -76,9 +76,10 @@ class Plan:
         }
         """Places of outputs that feed an FMU which steps before their own FMU."""
         needs = self._needs | self._seen()
-        through, circle = self._feedthrough(needs), _circle(needs)
-        self.method = _method(scene, self.sides, through, circle)
-        self.notes += _notes(scene, self.sides, self.method, through, circle)
+        through, self.circle = self._feedthrough(needs), _circle(needs)
+        """The variables of an algebraic loop of FMUs, in words, or ""."""
+        self.method = _method(scene, self.sides, through, self.circle)
+        self.notes += _notes(scene, self.sides, self.method, through, self.circle)
         self.throughs = [*self._throughs()] if self.method == "redo" else []
         """Feedthrough from a probe to a source, which the circuit solves itself, and its feed."""
 

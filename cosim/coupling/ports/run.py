@@ -111,6 +111,7 @@ class Run(ngspice.Leader):
             n_saved=count,
             driven=int(plan.driven),
             macro_step=macro,
+            ends=int(not plan.circle),
             fixed=int(any(not side.varies for side in plan.sides)),
             duration=scene.run.duration,
             after_jump=after_jump(scene),
