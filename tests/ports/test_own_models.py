@@ -172,6 +172,30 @@ def test_a_mean_over_a_macro_step_carries_the_integral(
     assert columns["g.q"].max() == pytest.approx(1.0 / (np.pi * 100.0), rel=2e-3)
 
 
+SAMPLED = """
+[[fmu]]
+name = "c"
+file = "sum.fmu"
+parameters = { every = 1e-3 }
+[[port]]
+from = "c.s"
+to = "g.u"
+slope = "held"
+"""
+
+
+@pytest.mark.parametrize("step", [2.5e-4, 1e-3])
+def test_a_sampled_output_is_held_into_another_fmu(
+    tmp_path: Path, library: Path, step: float
+) -> None:
+    """s = k from k ms on. Half a macro step of lead would take away that much of the delay of a
+    sampled loop, and here add up to 11 % of the integral in 10 ms, the sum of 0 to 9 times 1 ms."""
+    given = {"coupling.method": "macro-steps", "coupling.macro_step": step}
+    columns = run(tmp_path, library, SAMPLED, given).columns
+    assert columns["c.s"][100] == pytest.approx(10.0)
+    assert columns["g.q"][100] == pytest.approx(0.045, rel=1e-9)
+
+
 def test_outputs_are_those_of_the_start_values(tmp_path: Path, library: Path) -> None:
     columns = run(tmp_path, library, FROM_DRIVE, {}, "w = 0.25").columns
     assert columns["g.y"][0] == 0.25

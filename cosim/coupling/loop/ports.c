@@ -207,7 +207,7 @@ static void feed(Ports *c, const Feed *f, double time, double h)
     } else if (f->origin.kind == FROM_OUTPUT) {
         start = c->before[k];
         end = c->outputs[k];
-        mean = 0.5 * (start + end);
+        mean = f->origin.slope == HELD && !c->repeats ? start : 0.5 * (start + end);
     } else {
         start = drive_after(c, c->origin);
         end = drive_before(c, time);
