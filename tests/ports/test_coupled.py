@@ -378,6 +378,21 @@ def test_feedthrough_is_as_exact_as_one_netlist(tmp_path: Path, gain: float, ver
     assert error(run, fine) <= 1.5 * apart(plain["time"], plain["vf#branch"], fine)
 
 
+@pytest.mark.parametrize("gain", [0.5, 100.0])
+@pytest.mark.parametrize("start", [0.0, 0.7])
+def test_a_run_begins_at_the_operating_point_with_what_is_fed_through(
+    tmp_path: Path, gain: float, start: float
+) -> None:
+    """A battery's current through the FMU's resistor, and nothing that changes."""
+    build(tmp_path, "Load", through=True)
+    (tmp_path / "rl.cir").write_text("* load\nV1 in 0 5\nR1 in x 1\nL1 x y 10u\nVf y 0 0\n.end\n")
+    (tmp_path / "load.toml").write_text(LOAD)
+    columns = here(tmp_path / "load.toml", {"fmu.load.D": gain, "fmu.load.u": start}).columns
+    current = 5.0 / (1.0 + gain)
+    assert columns["i(Vf)"] == pytest.approx(current, rel=1e-6)
+    assert columns["load.y"] == pytest.approx(gain * current, rel=1e-6)
+
+
 @pytest.mark.parametrize("version", [2, 3])
 def test_feedthrough_that_no_fmu_declares_is_as_exact(tmp_path: Path, version: int) -> None:
     """A model structure without dependencies, as pythonfmu writes it, says nothing of them."""

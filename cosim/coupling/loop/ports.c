@@ -278,6 +278,15 @@ static int refresh(Ports *c, Stranger *s, double time)
     return set_inputs(s) && get_outputs(s);
 }
 
+/* Where steps are repeated, what the FMUs put out at the start. */
+static int refresh_all(Ports *c)
+{
+    for (Stranger *s = c->fmus; c->repeats && s < c->fmus + c->n_fmus; s++)
+        if (!refresh(c, s, 0.0))
+            return fmu_failed(c, s);
+    return 1;
+}
+
 static int restore_all(Ports *c)
 {
     for (Stranger *s = c->fmus; s < c->fmus + c->n_fmus; s++)
@@ -524,7 +533,8 @@ static double accepted(Ports *c, double time, double next_step)
         c->jump = piece_at(&c->drive, c->jump)->jump;
     if (time <= 0.0) {
         memcpy(c->last, c->now, (size_t)c->n_saved * sizeof *c->last);
-        begin_exchange(c);
+        if (refresh_all(c))
+            begin_exchange(c);
     } else {
         /* The last step may be so short that the time stays the same. */
         const int meets = time >= c->end - ON_TIME && time > c->origin;
@@ -798,6 +808,23 @@ int ports_step(double time, double *delta, double old_delta, int redo, int locat
 
 /* --- what Python calls --- */
 
+/* At the operating point, too, the circuit carries what is fed through, as seen at the start values of
+   the inputs. */
+static void carry_from_start(Ports *c)
+{
+    for (const Stranger *s = c->fmus; s < c->fmus + c->n_fmus; s++)
+        for (const Feed *f = s->feeds; f < s->feeds + s->n_feeds; f++)
+            if (f->origin.kind == FROM_PROBE && f->origin.scale != 0.0)
+                c->now[f->origin.place] = (*f->input - f->origin.offset) / f->origin.scale;
+    memcpy(c->start, c->now, (size_t)c->n_saved * sizeof *c->start);
+    if (!refresh_all(c))
+        return;
+    memcpy(c->before, c->outputs, (size_t)c->n_outputs * sizeof *c->before);
+    if (save_all(c) && learn(c))
+        for (Through *t = c->throughs; t < c->throughs + c->n_throughs; t++)
+            t->gain = t->next_gain;
+}
+
 void ports_begin(Ports *c)
 {
     memset(watched, 0, sizeof watched);
@@ -806,6 +833,8 @@ void ports_begin(Ports *c)
             fmu_failed(c, s);
     for (Source *s = c->sources; s < c->sources + c->n_sources; s++)
         s->response = -1.0;
+    if (going(c) && c->repeats)
+        carry_from_start(c);
     memcpy(c->before, c->outputs, (size_t)c->n_outputs * sizeof *c->before);
     set_lines(c);
     c->learn = c->n_throughs > 0;
