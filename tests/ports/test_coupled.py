@@ -393,6 +393,26 @@ def test_a_run_begins_at_the_operating_point_with_what_is_fed_through(
     assert columns["load.y"] == pytest.approx(gain * current, rel=1e-6)
 
 
+def test_a_comparator_that_the_circuit_leaves_when_it_switches(tmp_path: Path) -> None:
+    """A relaxation oscillator: no value of the source at the end of a step agrees where the
+    comparator turns it back."""
+    turned = "((Model *)m)->r[D] = m->r[U] > 0.5 ? -1.0 : m->r[U] < -0.5 ? 1.0 : m->r[D]"
+    recompiled(tmp_path, ("m->r[D] * m->r[U]", turned))
+    build(tmp_path, "Load", through=True)
+    (tmp_path / "rl.cir").write_text("* rc\nVf y 0 0\nR1 y c 1k\nC1 c 0 1u\n.ic v(c)=0\n.end\n")
+    (tmp_path / "load.toml").write_text(LOAD.replace('"i(Vf)"', '"v(c)"'))
+    with in_place():
+        run = Run(load(tmp_path / "load.toml", {"run.duration": 0.01}), lambda _: None)
+        run.run()
+    assert run.plan.method == "redo"
+    place = next(place for _, name, place, _ in run.plan.outputs() if name == "load.y")
+    times, values = run.points.array()[:, 0], run.points.array()[:, 1 + place]
+    switched = times[1:][np.diff(values) != 0.0]
+    expected = 1e-3 * (np.log(2.0) + np.log(3.0) * np.arange(len(switched)))
+    assert len(switched) == 9
+    assert switched == pytest.approx(expected, rel=1e-5)
+
+
 @pytest.mark.parametrize("version", [2, 3])
 def test_feedthrough_that_no_fmu_declares_is_as_exact(tmp_path: Path, version: int) -> None:
     """A model structure without dependencies, as pythonfmu writes it, says nothing of them."""

@@ -330,6 +330,7 @@ typedef struct Ports {
     Slope *slopes;
     int64_t n_slopes;
     int64_t learn;             /* whether their gains are to be looked at */
+    int64_t forced;            /* communication point from which a step is taken without agreement */
     double macro_step;         /* s; 0: each accepted step ends on a communication point */
     int64_t fixed;             /* whether an FMU takes no other step than that one */
     double duration, after_jump;

@@ -636,7 +636,20 @@ static void keep_bends(Ports *c, double h)
     }
 }
 
-/* Whether the attempt that has converged at `time` is to be repeated. */
+/* The step under way once more, with this length, and the sources as before its first attempt. */
+static int again_along_lines(Ports *c, double *delta, double length)
+{
+    for (Source *s = c->sources; s < c->sources + c->n_sources; s++)
+        s->rate = s->origin.kind == FROM_OUTPUT ? s->line : s->rate;
+    c->tries = 0;
+    c->redone++;
+    *delta = length;
+    return 1;
+}
+
+/* Whether the attempt that has converged at `time` is to be repeated. Where an output jumps when the
+   circuit reaches a value, and the circuit leaves it when the output jumps, none agrees: then the
+   step within which that lies is taken as the lines lead, and the source jumps at its end. */
 static int to_repeat(Ports *c, double time, double *delta, double old_delta)
 {
     if (c->stepped && !restore_all(c))
@@ -670,24 +683,23 @@ static int to_repeat(Ports *c, double time, double *delta, double old_delta)
         s->off = off;
     }
     const double h = time - c->origin;
-    if (agree && leaves_line(c, h)) {
-        c->met = h <= EVENT_WITHIN;
-        if (c->met) {
-            c->jumped = time;
-        } else { /* a shorter step, to find when */
-            c->tries = 0;
-            c->redone++;
-            for (Source *s = c->sources; s < c->sources + c->n_sources; s++)
-                s->rate = s->origin.kind == FROM_OUTPUT ? s->line : s->rate;
-            *delta = 0.5 * h;
-            return 1;
-        }
-    }
-    if (agree) {
+    const int leaves = c->forced == c->exchanged || (agree && leaves_line(c, h));
+    c->met = leaves && h <= EVENT_WITHIN;
+    if (leaves && !c->met) /* a shorter step, to find when */
+        return again_along_lines(c, delta, 0.5 * h);
+    if (c->met)
+        c->jumped = time;
+    if (agree || c->met) {
         keep_bends(c, h);
         return 0;
     }
-    if (++c->tries > MOST_TRIES) {
+    if (++c->tries > MOST_TRIES && h > EVENT_WITHIN) /* perhaps it jumps when the circuit answers */
+        return again_along_lines(c, delta, 0.5 * h);
+    if (c->tries > MOST_TRIES && c->forced < c->exchanged - 1) {
+        c->forced = c->exchanged;
+        return again_along_lines(c, delta, old_delta);
+    }
+    if (c->tries > MOST_TRIES) {
         c->status = NO_AGREEMENT;
         return 0;
     }
@@ -838,6 +850,7 @@ void ports_begin(Ports *c)
     memcpy(c->before, c->outputs, (size_t)c->n_outputs * sizeof *c->before);
     set_lines(c);
     c->learn = c->n_throughs > 0;
+    c->forced = -1;
     c->jump = c->driven ? piece_at(&c->drive, 0.0)->jump : INFINITY;
     late = loop_milliseconds() + LOOP_PATIENCE;
     loop_sent = 0;
