@@ -426,6 +426,16 @@ def test_feedthrough_that_no_fmu_declares_is_as_exact(tmp_path: Path, version: i
         here(tmp_path / "load.toml", {})
 
 
+def test_feedthrough_of_an_input_that_cannot_be_read_is_as_exact(tmp_path: Path) -> None:
+    """An element of an array, which the FMU takes but does not give back."""
+    recompiled(tmp_path, ("m->r[D] * m->r[U]", "m->r[D] * m->r[X1]"))
+    build(tmp_path, "Load", 3)
+    (tmp_path / "rl.cir").write_text(f"* load\n{RL}Vf y 0 0\n.end\n")
+    (tmp_path / "load.toml").write_text(LOAD.replace("load.u", "load.x[1]"))
+    run, plain, fine = against_one_netlist(tmp_path, "R2 z 0 10", {"fmu.load.D": 10.0})
+    assert error(run, fine) <= 1.5 * apart(plain["time"], plain["vf#branch"], fine)
+
+
 @pytest.mark.parametrize("gain", [0.5, 10.0])
 def test_feedthrough_by_way_of_another_fmu_is_as_exact(tmp_path: Path, gain: float) -> None:
     """The source is from the second FMU, of which the scene tells first."""

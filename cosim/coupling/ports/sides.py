@@ -98,26 +98,31 @@ class Side:
 
     def answers(self, output: Variable) -> set[str]:
         """The inputs with ports to which an output answers at once, seen by a nudge of each."""
-        raw, version = self.instance.raw, self.of.version
+        raw = self.instance.raw
 
-        def get(of: Variable) -> Array:
-            size = () if version == 2 else (of.size,)
-            found = getattr(raw, f"get{of.type}")([of.reference], *size)
-            return np.array(found, np.float64)
+        def get() -> Array:
+            size = () if self.of.version == 2 else (output.size,)
+            return np.array(getattr(raw, f"get{output.type}")([output.reference], *size))
 
-        def put(of: Variable, values: Array) -> None:
-            getattr(raw, f"set{of.type}")([of.reference], values.tolist())
+        def put(into: Variable, values: Array) -> None:
+            getattr(raw, f"set{into.type}")([into.reference], values.tolist())
 
         found: set[str] = set()
         with suppress(Exception):  # what fails here fails again in the run, which tells it
-            before = get(output)
+            before = get()
             for into in filter(lambda each: each.real, self.inputs):
-                given = get(into)
-                put(into, given + _NUDGE * np.maximum(np.abs(given), 1.0))
-                if not np.array_equal(get(output), before, equal_nan=True):
+                start = np.array(self._start(into))  # an FMU may not let an input be read
+                put(into, start + _NUDGE * np.maximum(np.abs(start), 1.0))
+                if not np.array_equal(get(), before, equal_nan=True):
                     found.add(into.name)
-                put(into, given)
+                put(into, start)
         return found
+
+    def _start(self, into: Variable) -> list[float]:
+        """The start values of an input."""
+        names = [into.name if into.size == 1 else f"{into.name}[{k}]" for k in range(into.size)]
+        pairs = zip(names, into.start, strict=True)
+        return [float(self._parameters.get(name, value)) for name, value in pairs]
 
     def state(self, row: int, repeats: bool) -> Any:
         """The instance as ``ports.c`` takes it; its part of the row is at the address ``row``. With
@@ -129,12 +134,7 @@ class Side:
         self.fmu = Fmu(instance=self.instance.raw.component, goes_back=int(repeats), **calls)
         loop().fmu_bind(ctypes.byref(self.fmu), self.of.version)
         inputs = _grouped(self.inputs)
-        given = self._parameters
-        starts = [
-            float(given.get(each.name if each.size == 1 else f"{each.name}[{k}]", value))
-            for each in inputs
-            for k, value in enumerate(each.start)
-        ]
+        starts = [value for each in inputs for value in self._start(each)]
         self._values = (c_double * max(len(starts), 1))(*starts)
         at, first = _places(inputs), ctypes.addressof(self._values)
         lines = [each for each in self._feeds if each[2].feed == 1]
