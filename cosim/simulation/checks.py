@@ -56,6 +56,10 @@ FAR = 0.05
 that run tells nothing: its steps pass over what the circuit does, as a smooth comparator between
 two edges of its carrier, and the scene's own may, too."""
 
+ROUNDED = 1e-12
+"""Least scale of a port's mean, SI, as ngspice's abstol for currents: less is rounding, as of the
+voltage across a balanced bridge, and differs from run to run."""
+
 WRONG = 0.2
 """Twice the error of v_average, relative, above which a note says what to do."""
 
@@ -148,7 +152,7 @@ def checked_ports(scene: Scene, run: Callable[[], Result], progress: Progress) -
         own = result.summary
         # Outputs that nothing joins may count an FMU's own steps.
         named = (name for name in asked_for(scene) if f"{name}.rms" in own)
-        scales = {f"{name}.mean": own[f"{name}.rms"] for name in named}
+        scales = {f"{name}.mean": max(own[f"{name}.rms"], ROUNDED) for name in named}
         told = _judges(scene, own, other.result(), scales, progress)
     errors = _errors(own, told, (name for name in own if name.endswith(".mean")), LEAST_TOLD)
     return replace(result, summary=own | {f"{name}_error": errors[name] for name in errors})
