@@ -61,8 +61,8 @@ _Kept, _Stretch, _Drive = (structures("stepper")[name] for name in ("Kept", "Str
 def simulate_fast(scene: Scene, progress: Progress) -> Result:
     """The run of a scene, with its rows. Raises SimulationFailed.
 
-    ``v_average_error`` is the difference of v_average to the FMU's, which costs about as much as a
-    run with steps half as long, and less than one fine enough to be told from.
+    ``v_average_error`` is the difference of v_average to the FMU's. That costs about as much as a
+    run with steps half as long, which may err alike, and less than one with steps short enough.
     """
     began = time.perf_counter()
     summary = summary_fast(scene, progress)
