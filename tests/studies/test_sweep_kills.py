@@ -116,6 +116,22 @@ def test_interrupted(scene: str, tmp_path: Path) -> None:
     assert not alive
 
 
+def test_interrupted_once_all_points_are_done(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """While their kinds of motion are looked at, which takes longer than a small sweep."""
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("cosim.studies.sweep.run.motion", interrupt)
+    over, short = {"drive.offset": [-0.78, -0.7]}, {"run.duration": 0.1}
+    with pytest.raises(KeyboardInterrupt):
+        sweep(THREADS, over, short, out=tmp_path, workers=1)
+    with xr.open_dataset(tmp_path / "sweep.nc", engine="scipy") as data:
+        assert data.v_average.notnull().all()
+
+
 @needs.posix
 def test_one_sweep_at_a_time(tmp_path: Path) -> None:
     first = subprocess.Popen(arguments(10, tmp_path), stdout=subprocess.DEVNULL)

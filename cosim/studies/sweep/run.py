@@ -156,14 +156,14 @@ def _sweep(
                         warnings.warn(f"{error} The sweep goes on.", Note, stacklevel=2)
                     ended = time.monotonic()
                     due = ended + max(_REFRESH, _RARELY * (ended - began))
+            if scene.run.solver == "fast":
+                for number, outcome in bench.run(_judged(design, numbers)):
+                    numbers.judge(number, outcome)
+            data = refreshed(last=True)
         except KeyboardInterrupt:
             with suppress(BadInput):  # what is done stands in the store, too
                 refreshed()
             raise
-        if scene.run.solver == "fast":
-            for number, outcome in bench.run(_judged(design, numbers)):
-                numbers.judge(number, outcome)
-        data = refreshed(last=True)
         if keep:
             points = [n for n in range(total) if not numbers.failures[n]]
             _keep(family, scene, design, keep, points, bench)
