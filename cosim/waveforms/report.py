@@ -1,6 +1,7 @@
 """The printed table of a run's numbers."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from math import nan
 from typing import Any
 
 from cosim.scene import Scene
@@ -80,7 +81,8 @@ def _own(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> str
         statistics.append("mean_error")
     lines = [f"  {'':<{width}}" + "".join(f"{x.replace('_', ' '):>13}" for x in statistics)]
     for name, words in zip(names, shown, strict=True):
-        values = "".join(f"{summary[f'{name}.{x}']:>13.6g}" for x in statistics)
+        # An error is not known where another run leaves the waveform out, as no finite number.
+        values = "".join(f"{summary.get(f'{name}.{x}', nan):>13.6g}" for x in statistics)
         lines.append(f"  {words:<{width}}{values}")
     more, still = len(moving) - len(names), len(signals) - len(moving)
     others = [f"{more} more in summary.json"] * (more > 0)

@@ -10,7 +10,8 @@ from cosim.scene import Scene, load
 from cosim.simulation import checks
 from cosim.simulation.simulate import simulate
 from cosim.toolchain.threads import Progress
-from tests.ports.foreign import build
+from cosim.waveforms.report import table
+from tests.ports.foreign import build, recompiled
 from tests.simulation.test_checks import within_twice_the_told
 
 pytestmark = [pytest.mark.physics, pytest.mark.checked]
@@ -55,6 +56,17 @@ def test_a_comparator_that_longer_steps_pass_over_does_not_hide_the_error(tmp_pa
         assert told < 20.0 * off
 
 
+BRIDGE = """* bridge
+V1 in 0 SIN(0 1 1k)
+R1 in out 1k
+C1 out 0 1u
+Ra out p 1k
+Rb out q 1k
+Rc p 0 1k
+Rd q 0 1k
+Re p q 2k
+.end
+"""
 BALANCED = """
 [circuit]
 model = "file"
@@ -78,9 +90,8 @@ def test_a_zero_but_for_rounding_asks_for_no_third_run(
     """The voltage across a balanced bridge: its mean differed by 11 % of its rms of 7 aV, so a run
     with steps 3.5 times as short told all errors, and took most of the time."""
     build(tmp_path, "Load")
-    arms = "R1 in out 1k\nC1 out 0 1u\nRa out p 1k\nRb out q 1k\nRc p 0 1k\nRd q 0 1k\nRe p q 2k\n"
-    (tmp_path / "balanced.cir").write_text(f"* bridge\nV1 in 0 SIN(0 1 1k)\n{arms}.end\n")
     (tmp_path / "balanced.toml").write_text(BALANCED)
+    (tmp_path / "balanced.cir").write_text(BRIDGE)
     scene, numbers, steps = load(tmp_path / "balanced.toml"), checks._numbers, list[float]()
 
     def counted(of: Scene, progress: Progress) -> dict[str, Any]:
@@ -91,3 +102,16 @@ def test_a_zero_but_for_rounding_asks_for_no_third_run(
     found = simulate(scene, checks="usual").summary
     assert found["v(p)-v(q).rms"] < 1e-15
     assert steps == [checks.COARSER * scene.circuit.max_step]
+
+
+def test_the_table_of_what_another_run_leaves_out(tmp_path: Path) -> None:
+    """An output that nothing reads, and that is no number in longer steps."""
+    recompiled(tmp_path, ("m->r[D] * m->r[U]", "m->steps < 2.5e4 * m->time ? NAN : m->r[U]"))
+    build(tmp_path, "Load")
+    (tmp_path / "balanced.toml").write_text(BALANCED)
+    (tmp_path / "balanced.cir").write_text(BRIDGE)
+    found = simulate(load(tmp_path / "balanced.toml"), checks="usual")
+    assert "load.y.mean" in found.summary and "load.y.mean_error" not in found.summary
+    lines = table(found.scene, found.summary, found.units).splitlines()
+    (line,) = (each for each in lines if each.startswith("  load.y "))
+    assert line.split()[-1] == "nan"
