@@ -11,7 +11,7 @@ from queue import SimpleQueue
 from typing import Any, NamedTuple, TypeVar
 
 from cosim.errors import BadInput
-from cosim.toolchain import threads as own
+from cosim.toolchain.threads import threads as plain_threads
 
 PATIENCE = 15.0
 """s, within which the cluster must answer."""
@@ -35,7 +35,7 @@ class Pool(NamedTuple):
 def threads(common: Any, count: int) -> Iterator[Pool]:
     """``count`` threads. Each call gets ``common`` as its first argument, and as its last one a
     progress function, which ends the call once the ``with`` block has ended."""
-    with own.threads(count) as (pool, progress):
+    with plain_threads(count) as (pool, progress):
         yield Pool(lambda call, *given: pool.submit(call, common, *given, progress), AHEAD * count)
 
 

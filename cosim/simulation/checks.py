@@ -133,11 +133,14 @@ def checked(
 def _too_long(scene: Scene, error: float) -> str:
     """A note on an ``error`` (m/s) of the user's netlist by its steps."""
     shorter = _longer(scene, 1.0 / COARSER).circuit
+    tried = (
+        f"circuit.{name} = {max(getattr(shorter, name), KEYS[f'circuit.{name}'].low):.1g}"
+        for name in ("reltol", "max_step")
+    )
     return (
         f"the steps of ngspice may move v_average by {2e3 * error:.2g} mm/s, more than a fifth of "
-        "it: either they are too long for this netlist (try "
-        f"circuit.reltol = {shorter.reltol:.1g} and circuit.max_step = {shorter.max_step:.1g}), or "
-        "the motion is chaotic."
+        f"it: either they are too long for this netlist (try {' and '.join(tried)}), or the motion "
+        "is chaotic."
     )
 
 

@@ -213,8 +213,8 @@ class Stranger:
             loaded.instanceName = name
             made = Interface(self.version, loaded, messages)
             arrays: dict[str, list[Any]] = {}
-            for name, value in parameters.items():
-                self._set(made, name, value, arrays)
+            for key, value in parameters.items():
+                self._set(made, key, value, arrays)
             made.initialise()
         except BadInput:
             raise
