@@ -76,17 +76,15 @@ def simulate_fast(scene: Scene, progress: Progress) -> Result:
 
 def summary_fast(scene: Scene, progress: Progress = lambda _: None) -> dict[str, Any]:
     """The summary of a run alone. Raises SimulationFailed."""
-    (found,) = summaries([scene], 1.0, progress)
+    (found,) = summaries([scene], progress)
     if not math.isfinite(found["v_average"]):
         raise SimulationFailed(LOST)
     return found
 
 
-def summaries(
-    scenes: Sequence[Scene], share: float = 1.0, progress: Progress = lambda _: None
-) -> list[dict[str, Any]]:
-    """The summaries of scenes, without notes, LANES of them side by side, in steps of ``share``
-    times ``run.step``; v_average is not finite where the motion overflowed."""
+def summaries(scenes: Sequence[Scene], progress: Progress = lambda _: None) -> list[dict[str, Any]]:
+    """The summaries of scenes, without notes, LANES of them side by side; v_average is not finite
+    where the motion overflowed."""
     found: list[dict[str, Any]] = [{}] * len(scenes)
     # Lanes share the step and the camera's instants; like durations keep all lanes busy.
     alike: dict[tuple[float, float], list[int]] = {}
@@ -96,7 +94,7 @@ def summaries(
         all_places.sort(key=lambda k: scenes[k].run.duration)
         for first in range(0, len(all_places), LANES):
             places = all_places[first : first + LANES]
-            batch = _batch([scenes[k] for k in places], share * step, progress)
+            batch = _batch([scenes[k] for k in places], step, progress)
             for place, summary in zip(places, batch, strict=True):
                 found[place] = summary
     return found
