@@ -4,8 +4,9 @@ import _thread
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any
 
@@ -18,8 +19,8 @@ SIGNALS = [each for each in signal.Signals if each.name in ("SIGINT", "SIGTERM",
 GRACE = 30
 """s after a signal until the system ends a command that is still there."""
 
-AGAIN = 0.02
-"""s after which a lost signal is raised again."""
+AGAIN = 1.0
+"""s after which a signal is raised again, unless its exception is on its way."""
 
 
 @contextmanager
@@ -27,23 +28,39 @@ def ended_alike() -> Iterator[None]:
     """Within this context all of SIGNALS raise KeyboardInterrupt, except those that were set to be
     ignored when this process started, as nohup does.
 
-    Python ignores exceptions raised while it frees an object, and compiled code those in functions
-    that cannot raise (Cython first prints them), so a signal there is raised again. Without free
-    memory a signal may still be lost, or the cleanup hang: after GRACE the system ends the process.
+    Libraries may swallow it: Python ignores exceptions raised while it frees an object, compiled
+    code those in functions that cannot raise (Cython first prints them) and in questions such as
+    hasattr. So it is raised again until some code handles it. Without free memory a signal may
+    still be lost, or the cleanup hang: after GRACE the system ends the process.
     """
     alarm = getattr(signal, "alarm", lambda seconds: None)
-    armed = False
+    struck = over = ours = False
+    striking = threading.Lock()
 
     def interrupt(number: int, frame: FrameType | None) -> None:
-        nonlocal armed
-        armed = True
-        alarm(GRACE)
+        nonlocal struck, ours
+        repeated, ours = ours, False
+        if repeated and (over or isinstance(sys.exc_info()[1], KeyboardInterrupt)):
+            return
+        if not (struck or over):
+            struck = True
+            alarm(GRACE)
+            with suppress(RuntimeError):  # no thread can be started
+                # A Thread would wait for a lock that the code interrupted here may hold.
+                _thread.start_new_thread(repeat, ())
         raise KeyboardInterrupt
 
+    def repeat() -> None:
+        nonlocal ours
+        while not over:
+            time.sleep(AGAIN)
+            with striking:
+                if not over:
+                    ours = True
+                    _strike()
+
     def ignored(what: "sys.UnraisableHookArgs") -> None:
-        if isinstance(what.exc_value, KeyboardInterrupt):  # raised here it would be ignored again
-            threading.Timer(AGAIN, _strike).start()
-        else:
+        if not isinstance(what.exc_value, KeyboardInterrupt):
             hook(what)
 
     def printed(kind: type[BaseException], *rest: Any) -> None:
@@ -55,11 +72,16 @@ def ended_alike() -> Iterator[None]:
     known = (signal.SIG_DFL, signal.default_int_handler)
     try:
         with _handled(lambda before: interrupt if before in known else None):
-            yield
+            try:
+                yield
+            finally:
+                over = True
+                if struck:
+                    alarm(0)
+                with striking:  # from here on no signal comes that the former handlers would get
+                    pass
     finally:
         sys.unraisablehook, sys.excepthook = hook, show
-        if armed:
-            alarm(0)
 
 
 def _strike() -> None:

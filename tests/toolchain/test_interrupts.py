@@ -56,6 +56,38 @@ except KeyboardInterrupt:
     print("ended")
 """
 
+DEAF_ONCE = """
+import time
+from cosim.toolchain import interrupts
+try:
+    with interrupts.ended_alike():
+        try:
+            print("ready", flush=True)
+            time.sleep(60.0)
+        except BaseException:  # as compiled code does that asks whether an object has an attribute
+            pass
+        time.sleep(60.0)
+except KeyboardInterrupt:
+    print("ended")
+"""
+
+CLEANING = """
+import time
+from cosim.toolchain import interrupts
+try:
+    with interrupts.ended_alike():
+        try:
+            print("ready", flush=True)
+            time.sleep(60.0)
+        finally:
+            time.sleep(3.0 * interrupts.AGAIN)
+            clean = True
+except KeyboardInterrupt:
+    assert clean
+    time.sleep(2.0 * interrupts.AGAIN)
+    print("ended")
+"""
+
 POLITE = """
 import signal, time
 from cosim.toolchain import interrupts
@@ -77,7 +109,7 @@ def heed_all() -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
-@pytest.mark.parametrize("program", [DEAF, FREEING, COMPILED, POLITE])
+@pytest.mark.parametrize("program", [DEAF, DEAF_ONCE, FREEING, COMPILED, CLEANING, POLITE])
 def test_a_signal_ends_a_command_that_does_not_hear_it(program: str, number: int) -> None:
     process = subprocess.Popen(
         [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
