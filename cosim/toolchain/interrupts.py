@@ -74,6 +74,11 @@ def ended_alike() -> Iterator[None]:
         with _handled(lambda before: interrupt if before in known else None):
             try:
                 yield
+            except BaseException as failure:
+                # Some libraries turn it into another failure, of which the user need not hear.
+                if struck and not isinstance(failure, KeyboardInterrupt):
+                    raise KeyboardInterrupt from failure
+                raise
             finally:
                 over = True
                 if struck:

@@ -71,6 +71,22 @@ except KeyboardInterrupt:
     print("ended")
 """
 
+TURNED = """
+import time
+from cosim.toolchain import interrupts
+class Panic(BaseException):
+    pass
+try:
+    with interrupts.ended_alike():
+        try:
+            print("ready", flush=True)
+            time.sleep(60.0)
+        except KeyboardInterrupt:  # as a library in Rust does while it loads
+            raise Panic from None
+except KeyboardInterrupt:
+    print("ended")
+"""
+
 CLEANING = """
 import time
 from cosim.toolchain import interrupts
@@ -109,7 +125,7 @@ def heed_all() -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
-@pytest.mark.parametrize("program", [DEAF, DEAF_ONCE, FREEING, COMPILED, CLEANING, POLITE])
+@pytest.mark.parametrize("program", [DEAF, DEAF_ONCE, FREEING, COMPILED, TURNED, CLEANING, POLITE])
 def test_a_signal_ends_a_command_that_does_not_hear_it(program: str, number: int) -> None:
     process = subprocess.Popen(
         [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
