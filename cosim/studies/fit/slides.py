@@ -64,81 +64,56 @@ class Slide:
     def log_likelihoods(self, kinetic: Array, plate: Array) -> Array:
         """Log-likelihoods (laws × pairs of instants) of laws (µ_k F_n/m and µ_p F_n/m, m/s²)."""
         chunks = [slice(k, k + CHUNK) for k in range(0, len(kinetic), CHUNK)]
-        whitened = self._whitened()
-        return np.concatenate([self._of_few(*whitened, kinetic[x], plate[x])[0] for x in chunks])
+        return np.concatenate([self._of_few(kinetic[x], plate[x])[0] for x in chunks])
 
-    def _whitened(self) -> tuple[Array, Array]:
-        """What the whitened residuals consist of where part and plate do not become equally fast
-        (pairs × 4 × frames): the heights less the plate's way, and what is subtracted for each unit
-        of velocity relative to the plate, acceleration, and velocity after the slide alone; and
-        the inner products of these four."""
-        since, sliding, beyond = self._times(self.time)
-        lasts = (self.end - self.begin)[:, None]
-        uniform = sliding**2 / 2 + lasts * beyond
-        parts = np.stack([self.z - self.v_plate * since, since, uniform, beyond], axis=1)
-        parts = parts @ self.whiten.swapaxes(1, 2)
-        return parts, parts @ parts.swapaxes(1, 2)
-
-    def _of_few(
-        self, parts: Array, products: Array, kinetic: Array, plate: Array
-    ) -> tuple[Array, Array]:
+    def _of_few(self, kinetic: Array, plate: Array) -> tuple[Array, Array]:
         """Log-likelihoods (laws × pairs) of at most CHUNK laws, and the likeliest velocity of the
-        part relative to the plate at the begin (pairs × laws), m/s; ``parts`` and ``products`` are
-        those of ``_whitened``.
+        part relative to the plate at the begin (pairs × laws), m/s.
 
         The part's initial height and velocity are free. Least squares finds both, the velocity by
-        Gauss–Newton, since the plate's friction changes its sign with it. Arrays are pairs × laws,
-        or pairs × laws × frames. The residuals and their derivative are never formed, only their
-        inner products: all that differs between laws but by a factor is ``late``, the time since
-        the turn at which part and plate are equally fast, and its square.
+        Gauss–Newton, since the plate's friction changes its sign with it.
         """
+        likelihoods = relative = np.zeros((len(self.begin), len(kinetic)))
+        whiten = self.whiten.swapaxes(1, 2)
         # The first pass leaves the plate's friction out: its sign needs a first velocity.
         friction = 0.0 * plate
-        relative = found = np.zeros((len(self.begin), len(kinetic)))
-        sliding, lasts = self._times(self.time)[1][:, None], (self.end - self.begin)[:, None]
-        whiten, none, one = self.whiten.swapaxes(1, 2), np.zeros_like(found), np.ones_like(found)
-        without = self.sign * kinetic - GRAVITY
         for _ in range(PASSES):
-            first, second, turn, share = _accelerations(relative, lasts, without, friction)
-            half = (second - first) / 2
-            error = np.stack([one, -relative, -first, -2 * half * (lasts - turn)], axis=-1)
-            slope = np.stack([none, one, none, share], axis=-1)
-            size, descent = _dot(slope @ products, slope), _dot(slope @ products, error)
-            square = _dot(error @ products, error)
-            if (turn < lasts).any():
-                late = np.maximum(sliding - turn[..., None], 0.0)
-                late, squared = late @ whiten, (late * late) @ whiten
-                of_late, of_squared = (x @ parts.swapaxes(1, 2) for x in (late, squared))
-                size += share * (2 * _dot(of_late, slope) + share * _dot(late, late))
-                descent += share * (_dot(of_late, error) - half * _dot(late, squared))
-                descent -= half * _dot(of_squared, slope)
-                square += half * (half * _dot(squared, squared) - 2 * _dot(of_squared, error))
-            size += LEAST_SIZE
-            found = (descent**2 / size - square) / 2  # of the linearised optimum
+            path, slope = self._path(relative, kinetic, friction, self.time)
+            error, slope = (self.z - path) @ whiten, slope @ whiten
+            size, descent = LEAST_SIZE + _dot(slope, slope), _dot(slope, error)
+            # Of the linearised optimum.
+            likelihoods = self.fixed[:, None] + (descent**2 / size - _dot(error, error)) / 2
             relative, friction = relative + descent / size, plate
-        return (self.fixed[:, None] + found).T, relative
+        return likelihoods.T, relative
 
-    def _times(self, time: Array) -> tuple[Array, Array, Array]:
-        """The times since the begin (pairs × frames), s: in all, within the slide, and after it."""
-        since, lasts = time - self.begin[:, None], (self.end - self.begin)[:, None]
-        return since, since.clip(0.0, lasts), (since - lasts).clip(0.0)
-
-    def predicted(self, kinetic: float, plate: float, time: Array) -> Array:
-        """The part's heights [m] at times ``time`` by a law [m/s²], with the law's likeliest pair
-        of instants; NaN outside the slide. The initial height fits the slide's tracked frames.
+    def _path(
+        self, relative: Array, kinetic: Array, plate: Array, time: Array
+    ) -> tuple[Array, Array]:
+        """The part's heights (pairs × laws × times), m from that at the begin, with the velocity
+        ``relative`` to the plate there (pairs × laws), m/s; and their derivatives by it, s.
 
         Before the begin and after the end the velocity is constant: the covariance holds how the
         part accelerates there."""
+        lasts = (self.end - self.begin)[:, None]
+        without = self.sign * kinetic - GRAVITY
+        first, second, turn, share = _accelerations(relative, lasts, without, plate)
+        since, lasts = (time - self.begin[:, None])[:, None], lasts[..., None]
+        sliding, beyond = since.clip(0.0, lasts), (since - lasts).clip(0.0)
+        relative, first, second, turn, share = (
+            x[..., None] for x in (relative, first, second, turn, share)
+        )
+        late = (sliding - turn).clip(0.0)  # within the slide, since part and plate were as fast
+        path = (self.v_plate + relative) * since + first * (sliding**2 / 2 + lasts * beyond)
+        path = path + (second - first) * (late**2 / 2 + (lasts - turn) * beyond)
+        return path, since + share * (late + beyond)
+
+    def predicted(self, kinetic: float, plate: float, time: Array) -> Array:
+        """The part's heights [m] at times ``time`` by a law [m/s²], with the law's likeliest pair
+        of instants; NaN outside the slide. The initial height fits the slide's tracked frames."""
         law = np.array([kinetic]), np.array([plate])
         likeliest = self.log_likelihoods(*law)[0].argmax()
         best = self.only(np.arange(len(self.begin)) == likeliest)
-        relative, lasts = best._of_few(*best._whitened(), *law)[1], best.end - best.begin
-        without = self.sign * law[0] - GRAVITY
-        first, second, turn, _ = _accelerations(relative, lasts, without, law[1])
-        since, sliding, beyond = best._times(np.concatenate([self.time, time]))
-        late = (sliding - turn).clip(0.0)
-        path = (self.v_plate + relative) * since + first * (sliding**2 / 2 + lasts * beyond)
-        path = (path + (second - first) * (late**2 / 2 + (lasts - turn) * beyond))[0]
+        path = best._path(best._of_few(*law)[1], *law, np.append(self.time, time))[0][0, 0]
         frames = len(self.time)
         start = best.weights[0] @ (self.z - path[:frames])
         slides = (time >= best.begin) & (time <= best.end)
