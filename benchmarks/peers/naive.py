@@ -128,7 +128,7 @@ def _instance(
 
 def _deck(scene: Scene) -> str:
     """The netlist with a sawtooth of ngspice's own."""
-    drive, (deck, *_) = scene.drive, prepare(scene)
+    drive, deck = scene.drive, prepare(scene).text
     low, high = (drive.offset + half * drive.amplitude for half in (-0.5, 0.5))
     rise = 1 / drive.frequency - 2 * _FALL
     pulse = f"PULSE({low!r} {high!r} 0 {rise!r} {_FALL} {_FALL} {1 / drive.frequency!r})"

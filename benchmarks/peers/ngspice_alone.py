@@ -7,13 +7,14 @@ the same compiled log takes what ngspice sends, so only the mechanics differ.
 
 from collections.abc import Sequence
 from contextlib import closing
+from dataclasses import replace
 from time import process_time
 
 import numpy as np
 
 from benchmarks.parts import replay
 from cosim.arrays import Array
-from cosim.circuit.joined import Edges
+from cosim.circuit.joined import Deck
 from cosim.circuit.netlist import prepare
 from cosim.coupling.loop.lead import Lead
 from cosim.coupling.loop.recorder import Recorder
@@ -52,16 +53,16 @@ Cz z 0 1 ic={z}
 Cp p 0 1 ic={z}"""
 
 
-def _netlist(scene: Scene, rest: dict[str, float]) -> tuple[str, dict[str, str], Edges]:
-    """The deck, and the vectors to log; ``rest`` are the heights (m) in equilibrium."""
-    deck, _, edges = prepare(scene)
+def _netlist(scene: Scene, rest: dict[str, float]) -> Deck:
+    """The deck with the mechanics in it; ``rest`` are the heights (m) in equilibrium."""
+    deck = prepare(scene)
     saved = ("i(vemf)", "v(p)")
     own = {"vemf": _mechanics(scene, rest), ".save": f".save {' '.join(saved)}"}
-    lines = [own.get(line.split()[0], line) for line in deck.splitlines()]
+    lines = [own.get(line.split()[0], line) for line in deck.text.splitlines()]
     # The trapezoidal rule is the better one for a mechanism.
     lines = [line.replace("method=gear", "method=trap") for line in lines]
     text = "\n".join(f"{x} uic" if x.startswith(".tran ") else x for x in lines)
-    return text, {name: name for name in saved}, edges
+    return replace(deck, text=text, vectors={name: name for name in saved})
 
 
 def run(scene: Scene, times: Sequence[float]) -> tuple[float, Array]:

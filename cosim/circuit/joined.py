@@ -5,7 +5,7 @@ expression, which an added B source computes as its voltage.
 """
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -44,22 +44,18 @@ class Edges:
 
 @dataclass(frozen=True)
 class Deck:
-    """The deck for ngspice, and the names of the vectors that it sends."""
+    """The deck for ngspice, and the vectors that it sends."""
 
     text: str
-    kinds: Mapping[str, str]
-    """``v`` or ``i`` of each source that a port feeds, by its lower-case name."""
-    vectors: tuple[str, ...]
-    """The saved vectors, in the order of ``words``."""
-    words: tuple[str, ...]
-    """Vectors and expressions: those that the scene reads, then those that ``measures`` need."""
-    measures: tuple[Measure, ...]
-    """The netlist's own ``.meas``."""
-    notes: tuple[str, ...]
-    """Sentences on lines of the netlist that have no effect."""
-    devices: tuple[str, ...]
-    """For each word the device parameter that has its value within a step; "" without one."""
+    vectors: Mapping[str, str]
+    """ngspice's names of the saved vectors, by the names that the host has for them."""
     edges: Edges
+    measures: Sequence[Measure] = ()
+    """The netlist's own ``.meas``."""
+    notes: Sequence[str] = ()
+    """Sentences on lines of the netlist that have no effect."""
+    devices: Sequence[str] = ()
+    """For the first vectors the device parameter that has the value within a step, or ""."""
 
 
 def unit(words: str) -> str:
@@ -105,17 +101,9 @@ def deck(
         each.line: "\n".join(_external(each, through)) for each in top.elements if each.name in fed
     }
     read_as = reading(netlist.words, len(words) if asked else 0)
-    edges = netlist.edges(fed, max_step, duration)
-    return Deck(
-        netlist.text(external, values, duration, reltol, max_step, edges.length),
-        {source.lower(): source[0].lower() for source in sources},
-        tuple(vector for vector, _ in read_as),
-        netlist.words,
-        tuple(netlist.measures),
-        tuple(without_effect(netlist.dropped)),
-        tuple(device if k < len(words) else "" for k, (_, device) in enumerate(read_as)),
-        edges,
-    )
+    vectors = {word: vector for word, (vector, _) in zip(netlist.words, read_as, strict=True)}
+    made = netlist.deck(external, values, vectors, duration, reltol, max_step)
+    return replace(made, devices=[device for _, device in read_as[: len(words)]])
 
 
 _ONE_BREAK, _ONE_TIME = 1e-10, 3e-15
@@ -157,36 +145,19 @@ class Checked:
     dropped: Sequence[Line] = ()
     """Lines that ngspice does not see."""
 
-    def edges(self, fed: Set[str], max_step: float, duration: float) -> Edges:
-        """Those of all sources but the ``fed`` ones. Simulators differ in the length of edges
-        without one; here it is the netlist's own step, or a run's longest, but at most 1 % of the
-        shortest on-time or period of a PULSE, or without an own one of the run's longest step where
-        an expression has one of these."""
-        every = (element for _, element, _ in self.top.order)
-        sources = [each.words for each in every if each and each.kind in "vi"]
-        if not any({"pulse", "exp"} & {*words} for words in sources):
-            return Edges((), 0.0)
-        own = _own_step(self.dropped)
-        lengths = [own or max_step, duration]
-        for words in sources:
-            if "pulse" in words:
-                values = [number(word) for word in words[words.index("pulse") + 1 :]]
-                lengths += [0.01 * value for value in values[5:7] if value]  # on-time and period
-                lengths += [0.01 * max_step] * (None in values[5:7] and own is None)
-        return Edges((*_pulses(self.top, fed),), min(lengths))
-
-    def text(
+    def deck(
         self,
         external: Mapping[Line, str],
         values: Mapping[str, float],
+        vectors: Mapping[str, str],
         duration: float,
         reltol: float,
         max_step: float,
-        edge: float,
-    ) -> str:
+    ) -> Deck:
         """The deck for ngspice: the netlist with the lines of ``external`` sources replaced,
         ``values`` for the top level's parameters, a seed for random numbers if the netlist has
-        none, and the analysis; ``edge`` is the length of :class:`Edges`."""
+        none, and the analysis; ``vectors`` are the saved ones."""
+        edges = self._edges(external, max_step, duration)
         text = [self.title.text]
         for line, element, holder in self.top.order:
             if holder is self.top and line in external:
@@ -204,10 +175,29 @@ class Checked:
             f".options norefvalue reltol={reltol!r} minbreak={min_break!r}",
             # All vectors are sent step by step; ngspice is to keep none, which would take memory.
             ".save none",
-            f".tran {edge or max_step!r} {duration!r} 0 {max_step!r}",
+            f".tran {edges.length or max_step!r} {duration!r} 0 {max_step!r}",
             ".end",
         ]
-        return "\n".join(text)
+        notes = [*without_effect(self.dropped)]
+        return Deck("\n".join(text), vectors, edges, self.measures, notes)
+
+    def _edges(self, external: Collection[Line], max_step: float, duration: float) -> Edges:
+        """Those of all sources but the ``external`` ones. Simulators differ in the length of edges
+        without one; here it is the netlist's own step, or a run's longest, but at most 1 % of the
+        shortest on-time or period of a PULSE, or without an own one of the run's longest step where
+        an expression has one of these."""
+        every = (element for _, element, _ in self.top.order)
+        sources = [each.words for each in every if each and each.kind in "vi"]
+        if not any({"pulse", "exp"} & {*words} for words in sources):
+            return Edges((), 0.0)
+        own = _own_step(self.dropped)
+        lengths = [own or max_step, duration]
+        for words in sources:
+            if "pulse" in words:
+                values = [number(word) for word in words[words.index("pulse") + 1 :]]
+                lengths += [0.01 * value for value in values[5:7] if value]  # on-time and period
+                lengths += [0.01 * max_step] * (None in values[5:7] and own is None)
+        return Edges((*_pulses(self.top, external),), min(lengths))
 
 
 def _external(element: Element, through: Sequence[tuple[str, str]]) -> Iterator[str]:
@@ -320,9 +310,10 @@ def own_parameters(top: Scope, name: str, given: Mapping[str, float]) -> dict[st
     return {key.lower(): value for key, value in given.items()}
 
 
-def _pulses(top: Scope, fed: Set[str]) -> Iterator[str]:
-    """ngspice's names of the sources with PULSE, such as ``v.x1.x2.v3``, but for those fed."""
+def _pulses(top: Scope, external: Collection[Line]) -> Iterator[str]:
+    """ngspice's names of the sources with PULSE, such as ``v.x1.x2.v3``, but the external ones."""
     for part in Expansion(top).parts(top, {}):
         path, element = part.path, part.element
-        if element.kind in "vi" and "pulse" in element.words and (path or element.name not in fed):
+        replaced = not path and element.line in external
+        if element.kind in "vi" and "pulse" in element.words and not replaced:
             yield f"{element.kind}.{path}{element.name}" if path else element.name

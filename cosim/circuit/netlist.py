@@ -12,10 +12,8 @@ from functools import cache
 from pathlib import Path
 
 from cosim.circuit.dialect.lines import Line, refuse
-from cosim.circuit.joined import Checked, Edges, checked, own_parameters, reading
+from cosim.circuit.joined import Checked, Deck, checked, own_parameters, reading
 from cosim.circuit.lint.checks import REQUIRED as AGREED
-from cosim.circuit.lint.deck import read
-from cosim.circuit.outputs import Measure, measures, without_effect
 from cosim.files.resources import circuits
 from cosim.scene import Scene
 
@@ -64,9 +62,8 @@ def path_of(scene: Scene) -> Path:
     return circuits() / f"{circuit.model}.cir"
 
 
-def prepare(scene: Scene) -> tuple[str, dict[str, str], Edges]:
-    """The deck of the scene's circuit, ngspice's names of the vectors to log, by the log's, and the
-    edges of its sources.
+def prepare(scene: Scene) -> Deck:
+    """The deck of the scene's circuit; the names of its vectors are the log's.
 
     The run goes to ``run.duration`` with steps of at most ``circuit.max_step``. Raises BadInput,
     beginning with the netlist's file and line, for what is wrong with it or might do harm.
@@ -92,10 +89,6 @@ def prepare(scene: Scene) -> tuple[str, dict[str, str], Edges]:
     if companion:
         emf = scene.renamed.get("machine.back_emf", "vemf").lower()
         _carry_inertia(external, title, present, emf)
-    values = parameters(scene) | own_parameters(netlist.top, str(path), scene.circuit.param or {})
-    circuit, duration = scene.circuit, scene.run.duration
-    edges = netlist.edges(fed, circuit.max_step, duration)
-    text = netlist.text(external, values, duration, circuit.reltol, circuit.max_step, edges.length)
     for node in ("out", "sense"):
         if f"v({node})" not in words and node not in present:
             port = f', or a [[port]] to "machine.{node}"' if scene.renamed else ""
@@ -106,7 +99,10 @@ def prepare(scene: Scene) -> tuple[str, dict[str, str], Edges]:
         saved[MOTIONAL] = MOTIONAL
     vectors = dict(zip(netlist.words, reading(netlist.words), strict=True))
     saved |= {name: vectors[word][0] for name, word in words.items()}
-    return text, saved, edges
+    circuit = scene.circuit
+    values = parameters(scene) | own_parameters(netlist.top, str(path), circuit.param or {})
+    steps = scene.run.duration, circuit.reltol, circuit.max_step
+    return netlist.deck(external, values, saved, *steps)
 
 
 def _words(scene: Scene) -> dict[str, str]:
@@ -126,13 +122,6 @@ def _checked(
 def _packaged(path: Path) -> Checked:
     """A netlist of the package, read once a process; a run's step sets its edges, not its own."""
     return replace(_checked(path, {}, ()), dropped=())
-
-
-def asked_for(scene: Scene) -> tuple[list[Measure], list[str]]:
-    """The measurements of a user's netlist, whose words are in the log, and a sentence for each of
-    its lines that has no effect."""
-    _, dropped = read(path_of(scene))
-    return measures(dropped), [*without_effect(dropped)]
 
 
 def _joined_sources(renamed: Mapping[str, str]) -> list[str]:

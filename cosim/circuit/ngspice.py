@@ -22,7 +22,7 @@ from typing import Any, ClassVar
 from PySpice.Spice.NgSpice import Shared
 
 from cosim.circuit.dialect.words import sent
-from cosim.circuit.joined import drawn
+from cosim.circuit.joined import Deck, drawn
 from cosim.errors import BadInput, SimulationFailed, plain
 from cosim.toolchain.libraries import library, ngspice_library
 from cosim.toolchain.serving import retire
@@ -138,15 +138,15 @@ class Engine(Shared.NgSpiceShared):
     def _send_data_c(self, plain: Any) -> None:
         """Ignore PySpice's own callback."""
 
-    def transient(self, deck: str, save: tuple[str, ...], leader: Leader) -> None:
-        """Run the transient analysis of ``deck``; ``save`` are its saved vectors, in this order.
+    def transient(self, deck: Deck, leader: Leader) -> None:
+        """Run the transient analysis of ``deck``.
 
         Raises what was given to ``fail``, or SimulationFailed for a vector that is not there.
         """
-        self._failure, self._save, self._leader = None, save, leader
+        self._failure, self._save, self._leader = None, tuple(deck.vectors.values()), leader
         leader.begin()
         try:
-            self._run(deck)
+            self._run(deck.text)
         finally:
             leader.finish()
             self._leader = None

@@ -35,8 +35,8 @@ def netlist(
         raise BadInput(f"--input {plain(', '.join(inputs))}: names a source twice.")
     called = "--input", "--output"
     made = deck(path, inputs, outputs, {}, 1.0, reltol, max_step, False, {}, called)
-    kinds = {name: made.kinds[name.lower()] for name in inputs}
-    vectors = dict(zip(outputs, made.vectors, strict=False))  # those of .meas follow
+    kinds = {name: name[0].lower() for name in inputs}
+    vectors = {words: made.vectors[words] for words in outputs}  # without those of .meas
     write(made.text, kinds, vectors, target, max_step, version, made.edges.pulses)
 
 

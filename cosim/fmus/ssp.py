@@ -66,10 +66,9 @@ def ssp(scene: Scene, target: Path, fmi: int = 2) -> None:
 
 def _deck(scene: Scene) -> str:
     """The scene's circuit with its command inside, and the current of one coil."""
-    text, *_ = prepare(scene)
     columns = {"vcommand": "v1", "vdac": "dac", "voffset": "pin"}
     lines = []
-    for line in text.splitlines():
+    for line in prepare(scene).text.splitlines():
         name, *rest = line.split(" ", 3)
         column = columns.get(name.lower())
         if column and rest[-1] == "external":

@@ -7,12 +7,13 @@ that swing most must be reported. At the bench's own tolerance none is, with eit
 """
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from cosim.circuit.false_cycles import BURST, burst_ends, swings
-from cosim.circuit.joined import Edges
+from cosim.circuit.joined import Deck
 from cosim.coupling.loop import lead
 from cosim.errors import SimulationFailed
 from cosim.scene import Scene, load
@@ -60,10 +61,10 @@ def scene(case: tuple, reltol: float) -> Scene:
 def trapezoidal(monkeypatch: pytest.MonkeyPatch) -> None:
     original = lead.prepare
 
-    def prepare(scene: Scene) -> tuple[str, dict[str, str], Edges]:
-        deck, saved, edges = original(scene)
-        assert "method=gear" in deck
-        return deck.replace("method=gear", "method=trap"), saved, edges
+    def prepare(scene: Scene) -> Deck:
+        made = original(scene)
+        assert "method=gear" in made.text
+        return replace(made, text=made.text.replace("method=gear", "method=trap"))
 
     begin = lead.Lead.begin
 

@@ -2,12 +2,13 @@
 
 import ctypes
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from cosim.circuit.joined import Edges
+from cosim.circuit.joined import Deck
 from cosim.coupling.loop import lead, recorder
 from cosim.coupling.loop.structures import (
     Fmu,
@@ -227,9 +228,9 @@ def test_python_fails_below_ngspice(
 def test_a_source_that_nothing_feeds(monkeypatch: pytest.MonkeyPatch) -> None:
     original = lead.prepare
 
-    def strange(scene: Scene) -> tuple[str, dict[str, str], Edges]:
-        deck, saved, edges = original(scene)
-        return deck.replace("\n.tran", "\nVodd odd 0 external\nRodd odd 0 1\n.tran"), saved, edges
+    def strange(scene: Scene) -> Deck:
+        made, odd = original(scene), "\nVodd odd 0 external\nRodd odd 0 1"
+        return replace(made, text=made.text.replace("\n.tran", f"{odd}\n.tran"))
 
     monkeypatch.setattr(lead, "prepare", strange)
     with pytest.raises(SimulationFailed, match="external source vodd that nothing feeds"):

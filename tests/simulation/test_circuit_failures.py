@@ -9,17 +9,19 @@ import itertools
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cosim.circuit import ngspice
+from cosim.circuit.joined import Deck, Edges
 from cosim.coupling.loop import lead
 from cosim.coupling.methods.jacobi import Jacobi
 from cosim.errors import BadInput, CosimError, SimulationFailed
 from cosim.files.resources import circuits
-from cosim.scene import load
+from cosim.scene import Scene, load
 from cosim.simulation import elsewhere
 from cosim.simulation.rungs.spice import _refuse_foreign_coil
 from cosim.simulation.simulate import simulate
@@ -211,7 +213,7 @@ def _spoil_or_run(spoil: int, progress: object) -> object:
     if not spoil:
         return os.getpid(), good_run().tolist()
     deck = "spoilt\nV1 a 0 1\nR1 a 0 {nothing}\n.tran 1u 1m\n.end"
-    lead.engine().transient(deck, ("v(a)",), _Nobody())
+    lead.engine().transient(Deck(deck, {"v(a)": "v(a)"}, Edges((), 0.0)), _Nobody())
     assert ngspice.Engine.poisoned
     return os.getpid()
 
@@ -260,9 +262,9 @@ def test_not_a_number_is_no_result(monkeypatch: pytest.MonkeyPatch, before: np.n
 def test_early_end_is_no_result(monkeypatch: pytest.MonkeyPatch, before: np.ndarray) -> None:
     original = lead.prepare
 
-    def shortened(scene: object) -> object:
-        deck, saved, edges = original(scene)  # pyright: ignore[reportArgumentType]
-        return deck.replace(" 0.01 0 ", " 0.004 0 "), saved, edges
+    def shortened(scene: Scene) -> Deck:
+        made = original(scene)
+        return replace(made, text=made.text.replace(" 0.01 0 ", " 0.004 0 "))
 
     monkeypatch.setattr(lead, "prepare", shortened)
     told = r"stopped at t = 0\.004 s of 0\.01 s"

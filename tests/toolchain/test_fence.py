@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from cosim.circuit import ngspice
+from cosim.circuit.joined import Deck, Edges
 from cosim.coupling.loop import lead
 from cosim.errors import SimulationFailed
 from cosim.scene import load
@@ -211,7 +212,7 @@ def _load() -> None:
 def _raw(deck: str, progress: object) -> str:
     """What ngspice says of a deck that nobody has looked at."""
     engine = lead.engine()
-    engine.transient(deck, ("v(a)",), _Nobody())
+    engine.transient(Deck(deck, {"v(a)": "v(a)"}, Edges((), 0.0)), _Nobody())
     return "\n".join((*engine._stdout, *engine._stderr))
 
 

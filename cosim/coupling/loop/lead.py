@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.circuit import ngspice
-from cosim.circuit.joined import Edges
+from cosim.circuit.joined import Deck, Edges
 from cosim.circuit.netlist import MOTIONAL, prepare
 from cosim.coupling.loop.recorder import Recorder
 from cosim.coupling.loop.structures import (
@@ -65,13 +65,13 @@ class Lead(ngspice.Leader):
         scene: Scene,
         command: Command,
         recorder: Recorder,
-        deck: tuple[str, dict[str, str], Edges] | None = None,
+        deck: Deck | None = None,
     ) -> None:
-        """``deck``, its saved vectors and its edges replace the scene's."""
+        """``deck`` replaces the scene's."""
         self._duration = scene.run.duration
         self._recorder = recorder
-        self._deck, vectors, self._edges = deck or prepare(scene)
-        self._saved, self._vectors = tuple(vectors), tuple(vectors.values())
+        self.deck = deck or prepare(scene)
+        self._saved = tuple(self.deck.vectors)
         width = len(LOG) + len(self._saved)
         self._log = Tape(width)
         # With `uic`, ngspice accepts t = 0 before it has sent any value.
@@ -120,7 +120,7 @@ class Lead(ngspice.Leader):
         """Run to ``run.duration``. Raises SimulationFailed with the reason and the time reached."""
         state = self.state
         try:
-            engine().transient(self._deck, self._vectors, self)
+            engine().transient(self.deck, self)
         finally:
             self._attend()
         if state.status == FMU_FAILED:
@@ -129,7 +129,7 @@ class Lead(ngspice.Leader):
 
     def loaded(self, engine: ngspice.Engine) -> None:
         """Pass on the corners of PULSE sources."""
-        self._pulses = pass_corners(self.state.pulses, engine, self._edges, self._duration)
+        self._pulses = pass_corners(self.state.pulses, engine, self.deck.edges, self._duration)
 
     @property
     def steps(self) -> int:

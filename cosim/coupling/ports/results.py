@@ -49,7 +49,7 @@ def joined(
         for what, value in _numbers(scene.run.settle, times, values, continuous).items()
     }
     log = run.log.array()
-    known = {w: log[:, 1 + len(run.plan.names) + k] for k, w in enumerate(run.deck.words)}
+    known = {w: log[:, 1 + len(run.plan.names) + k] for k, w in enumerate(run.deck.vectors)}
     values, without = measured(run.deck.measures, log[:, 0], known)
     summary |= values
     length = scene.run.duration - scene.run.settle
@@ -106,8 +106,7 @@ def _signals(run: Run) -> Iterator[Signal]:
         for column, (name, of, goes_on) in enumerate(side.columns, 1 + side.first):
             yield name, of, points[:, 0], points[:, column], goes_on
     for k, name in enumerate(run.plan.names):
-        kind = run.deck.kinds[name.lower()]
-        yield name, "V" if kind == "v" else "A", log[:, 0], log[:, 1 + k], True
+        yield name, "V" if name[0] in "vV" else "A", log[:, 0], log[:, 1 + k], True
     for k, words in enumerate(run.plan.words):
         yield words, unit(words), log[:, 0], log[:, 1 + len(run.plan.names) + k], True
 

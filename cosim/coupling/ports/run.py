@@ -141,7 +141,7 @@ class Run(ngspice.Leader):
         state, duration = self.state, self._scene.run.duration
         self._progress(0.0)  # the FMUs are instantiated
         try:
-            engine().transient(self.deck.text, self.deck.vectors, self)
+            engine().transient(self.deck, self)
         finally:
             self._attend()
             for side, state_of in zip(self.plan.sides, self.fmus, strict=False):

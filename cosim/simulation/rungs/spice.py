@@ -7,7 +7,7 @@ from itertools import chain
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.circuit.netlist import AT_WORK, AT_WORK_HERE, OWN, asked_for
+from cosim.circuit.netlist import AT_WORK, AT_WORK_HERE, OWN
 from cosim.coupling.loop.recorder import Recorder
 from cosim.drive.command import command
 from cosim.drive.pieces import Command
@@ -33,10 +33,9 @@ def drive(scene: Scene, recorder: Recorder) -> Driven:
     values, notes = {}, []
     if scene.circuit.netlist is not None:
         _refuse_foreign_coil(scene, log)
-        asks, notes = asked_for(scene)
         known = {word.removeprefix(OWN): log[word] for word in log if word.startswith(OWN)}
-        values, without = measured(asks, log["time"], known)
-        notes += [*without, *engine().remarks()]
+        values, without = measured(lead.deck.measures, log["time"], known)
+        notes += [*lead.deck.notes, *without, *engine().remarks()]
         notes += _folded(scene, log, recorder.time)
     electric, waves = _electrics(scene, command(scene), log, recorder.time)
     return Driven(
