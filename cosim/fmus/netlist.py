@@ -4,12 +4,13 @@ importer's own ngspice (``fmu/netlist``)."""
 import hashlib
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from math import inf
 from pathlib import Path
 
 from cosim.circuit.dialect.words import number, sent
-from cosim.circuit.joined import deck, unit
+from cosim.circuit.joined import Deck, deck, unit
 from cosim.errors import BadInput, plain
 from cosim.fmus.pack import pack
 from cosim.toolchain.libraries import SUFFIX, compiled
@@ -35,33 +36,26 @@ def netlist(
         raise BadInput(f"--input {plain(', '.join(inputs))}: names a source twice.")
     called = "--input", "--output"
     made = deck(path, inputs, outputs, {}, 1.0, reltol, max_step, False, {}, called)
-    kinds = {name: name[0].lower() for name in inputs}
     vectors = {words: made.vectors[words] for words in outputs}  # without those of .meas
-    write(made.text, kinds, vectors, target, max_step, version, made.edges.pulses)
+    write(replace(made, vectors=vectors), inputs, target, max_step, version)
 
 
-def write(
-    text: str,
-    inputs: Mapping[str, str],
-    outputs: Mapping[str, str],
-    target: Path,
-    step: float,
-    fmi: int,
-    pulses: Sequence[str] = (),
-) -> None:
-    """Write the .fmu of a deck: ``inputs`` are its external sources with their kinds, ``v`` or
-    ``i``, ``outputs`` words with the vectors that have their values."""
+def write(deck: Deck, inputs: Sequence[str], target: Path, step: float, fmi: int) -> None:
+    """Write the .fmu of a deck: ``inputs`` are its external sources, its vectors the outputs."""
+    text, outputs = deck.text, deck.vectors
     # A .param is no parameter of the FMU if another variable has its name, or it has two values.
     given = [*_given(text)]
     taken = {"time", *inputs, *(f"{name}_slope" for name in inputs), *outputs}
     taken |= {name for name, count in Counter(name for name, _ in given).items() if count > 1}
     rows = [("parameter", k, "1", repr(v), "Of the netlist", k) for k, v in given if k not in taken]
-    for name, kind in inputs.items():
-        rows.append(("input", name, _UNITS[kind], "0", "Value of the source", name.lower()))
+    for name in inputs:
+        rows.append(
+            ("input", name, _UNITS[name[0].lower()], "0", "Value of the source", name.lower())
+        )
     for words, vector in outputs.items():
         shown = _UNITS.get(unit(words), unit(words))
         rows.append(("output", words, shown, "0", "At the last accepted step", sent(vector)))
-    rows += [("pulse", name) for name in pulses]
+    rows += [("pulse", name) for name in deck.edges.pulses]
     name = re.sub(r"\W", "_", target.stem, flags=re.ASCII)
     rows = [("about", f"{plain(target.stem)}, computed by ngspice"), ("step", repr(step)), *rows]
     ports = "".join("\t".join(row) + "\n" for row in rows)

@@ -6,12 +6,14 @@ The drive is a PWL source within the netlist, so that the machine needs no other
 import tempfile
 import zipfile
 from collections.abc import Mapping
+from dataclasses import replace
 from math import nextafter
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from cosim.circuit.joined import Deck
 from cosim.circuit.netlist import prepare
 from cosim.drive.command import command
 from cosim.drive.pieces import LEVEL, SINE, Piece
@@ -54,9 +56,7 @@ def ssp(scene: Scene, target: Path, fmi: int = 2) -> None:
         raise BadInput(f"{scene.origin}: an .ssp has one surface and a constant normal_force.")
     with tempfile.TemporaryDirectory(prefix="ssp-") as name:
         folder = Path(name)
-        vectors = {"current": f"v({_CURRENT})"}
-        step = scene.circuit.max_step
-        write(_deck(scene), {"Vemf": "v"}, vectors, folder / "circuit.fmu", step, fmi)
+        write(_deck(scene), ["Vemf"], folder / "circuit.fmu", scene.circuit.max_step, fmi)
         zipped(unpacked(fmi), folder / "mechanics.fmu")
         with whole(target) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
             archive.writestr("SystemStructure.ssd", _structure(scene))
@@ -64,11 +64,12 @@ def ssp(scene: Scene, target: Path, fmi: int = 2) -> None:
                 archive.write(folder / fmu, f"resources/{fmu}")
 
 
-def _deck(scene: Scene) -> str:
+def _deck(scene: Scene) -> Deck:
     """The scene's circuit with its command inside, and the current of one coil."""
+    made = prepare(scene)
     columns = {"vcommand": "v1", "vdac": "dac", "voffset": "pin"}
     lines = []
-    for line in prepare(scene).text.splitlines():
+    for line in made.text.splitlines():
         name, *rest = line.split(" ", 3)
         column = columns.get(name.lower())
         if column and rest[-1] == "external":
@@ -76,7 +77,7 @@ def _deck(scene: Scene) -> str:
             line = f"{name} {rest[0]} {rest[1]} PWL({points})"
         lines.append(line)
     lines.insert(-1, f"B{_CURRENT} {_CURRENT} 0 V=i(vemf)/{scene.coil.count}")
-    return "\n".join(lines)
+    return replace(made, text="\n".join(lines), vectors={"current": f"v({_CURRENT})"})
 
 
 def _points(scene: Scene, column: str) -> list[tuple[float, float]]:

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -243,6 +244,12 @@ def test_its_variables_are_each_ones_own(
     assert {each.name for each in described.modelVariables if each.causality == "parameter"} == {
         "c"
     }
+    twice = ["--output", "v(3v3)", "--output", "v(2)"]  # the first is in ``given``, too
+    assert main(["fmu", "netlist", *given, *twice]) == 0
+    with zipfile.ZipFile(tmp_path / "own.fmu") as archive:
+        rows = archive.read("resources/ports.txt").decode().splitlines()
+    vectors = {row.split("\t")[1]: row.split("\t")[-1] for row in rows if row[:6] == "output"}
+    assert vectors == {"v(3v3)": "V(3v3)", "v(2)": "V(2)"}
     for wrong, said in (
         (["--input", "vin", "--input", "VIN"], "names a source twice"),
         (["--max-step", "inf"], "--max-step must be above 0 s and finite"),

@@ -12,6 +12,7 @@ import cosim
 from benchmarks.peers import masters
 from cosim.cli.main import main
 from cosim.drive.command import command as command_of
+from cosim.files.resources import circuits
 from cosim.toolchain.processes import in_place
 
 STEP, DURATION = 1e-4, 0.1
@@ -104,6 +105,20 @@ def test_the_pins_make_the_command(tmp_path: Path, waveform: str) -> None:
     wanted = command_of(command).values(at)
     np.testing.assert_allclose(15.0 / 4.7 * (pins[0] - pins[1]), wanted, atol=2e-3)
     assert volts["vdac"][0] == pytest.approx(volts["voffset"][0])  # no command yet
+
+
+def test_a_netlists_pulses_keep_their_edges(tmp_path: Path) -> None:
+    """Its FMU announces their corners, which ngspice may pass over; as that of a netlist alone."""
+    own = (circuits() / "examples" / "h_bridge.cir").read_text()
+    pulse = "Vpwm pwm 0 PULSE(0 1 0 1n 1n 25u 50u)\nRpwm pwm 0 1k\n"
+    (tmp_path / "own.cir").write_text(own.replace(".end\n", f"{pulse}.end\n"))
+    given = ["circuit.model=file", f"circuit.netlist={tmp_path / 'own.cir'}"]
+    given = [word for each in given for word in ("--set", each)]
+    file = tmp_path / "rig.ssp"
+    assert main(["fmu", "ssp", "reference", *given, "--out", str(file)]) == 0
+    with zipfile.ZipFile(file) as archive:
+        inner = zipfile.ZipFile(archive.open("resources/circuit.fmu"))
+        assert "\npulse\tvpwm\n" in inner.read("resources/ports.txt").decode()
 
 
 @pytest.mark.parametrize(
