@@ -40,8 +40,25 @@ class Run:
     value: float | None
 
 
+@dataclass(frozen=True)
+class Aim:
+    """The largest, or the least, value of a number of the summary within ranges of keys."""
+
+    quantity: str
+    largest: bool
+    ranges: dict[str, tuple[float, float]]
+    heat: float
+    """Limit of the heat in a coil, W."""
+    seed: int
+    waveform: str
+    """The family that is searched; empty for the scene's own waveform."""
+    turned: int
+    """How many of the keys, from the first on, are turned at each setting of a robust search, whose
+    values are medians over the turns, or the worst if their signs differ; 0 without turns."""
+
+
 @dataclass(frozen=True, repr=False)
-class Tuning:
+class Tuning(Aim):
     """A finished search.
 
     ``neighbours`` gives for each key the values with this key turned by TURN of its range down and
@@ -49,9 +66,6 @@ class Tuning:
     where such a turn became the best run itself and the budget had no runs left for its turns.
     """
 
-    quantity: str
-    largest: bool
-    ranges: dict[str, tuple[float, float]]
     runs: list[Run]
     best: Run
     neighbours: dict[str, list[float | None]]
@@ -59,15 +73,8 @@ class Tuning:
     """The scene at the best settings."""
     scouts: int
     """Number of preceding, cheaper runs on the rung "limited" or with the fast solver."""
-    seed: int
     by_fast: float | None = None
     """The fast solver's value at the best run, where it searched; ``value`` is then the FMU's."""
-    waveform: str = ""
-    """The family that was searched; empty for the scene's own waveform."""
-    robust: bool = False
-    """Whether values are medians over the turns of the keys, or the worst if their signs differ."""
-    heat: float = inf
-    """Limit of the heat in a coil, W."""
     motion: Mapping[str, Any] = field(default_factory=dict[str, Any])
     """The summary's numbers on the kind of motion at the best settings. Where it is chaotic, the
     value is one sample of many."""
@@ -174,7 +181,8 @@ class Tuning:
         headline(
             figure,
             f"{self.scene.name}{self.waveform and f', {self.waveform}'}: "
-            f"{'robust ' * self.robust}{self.quantity} {best} at {', '.join(where[:MOST_KEYS])}\n"
+            f"{'robust ' if self.turned else ''}{self.quantity} {best} at "
+            f"{', '.join(where[:MOST_KEYS])}\n"
             f"{len(values)} runs" + (f", and {self.scouts} ahead, cheaper" if self.scouts else ""),
         )
         return figure
@@ -203,7 +211,7 @@ class Tuning:
                 for each in (self, *self.others)
                 if each.waveform
             },
-            "robust": self.robust,
+            "robust": bool(self.turned),
             "heat_limit": self.heat if isfinite(self.heat) else None,
             "turns": [-TURN, TURN],
             "neighbours": self.neighbours,
@@ -246,7 +254,7 @@ class Tuning:
             lines.append(f"  {words}")
         if words := motion_in_words(self.motion):
             lines.append(f"  motion: {words}")
-        if self.robust:
+        if self.turned:
             lines.append(
                 f"  values are medians over the keys' turns by {percent(TURN)}, or the worst of "
                 "them where their signs differ"

@@ -3,7 +3,7 @@
 import os
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack, nullcontext, suppress
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from math import inf, isfinite
 from pathlib import Path
@@ -26,7 +26,7 @@ from cosim.search.turns import TURN, faces, turned
 from cosim.simulation.checks import motion
 from cosim.simulation.fidelity import Fidelity
 from cosim.studies.study import check_seed
-from cosim.studies.tune.found import Run, Tuning, write_runs
+from cosim.studies.tune.found import Aim, Run, Tuning, write_runs
 from cosim.typed import typed
 from cosim.waveforms.quantities import SUMMARY, UNITLESS
 
@@ -124,60 +124,46 @@ def tune(
     refuse_unknown(scene, keys)
     most = most_heat(scene, heat)
     both = {"coil.polarity": (-1.0, 1.0)} if polarity else {}
-    families: dict[str, tuple[Scene, dict[str, tuple[float, float]]]] = {}
-    asked = [*filter(None, [waveform])] if isinstance(waveform, str) else waveform
-    for name in asked or [""]:
-        changes, shape = family(name) if asked else ({}, {})
-        families[name] = changed(scene, changes, "--waveform"), {**keys, **both, **shape}
-    least = FEWEST_RUNS + 2 * max(len(ranges) for _, ranges in families.values())
+    names = [*filter(None, [waveform])] if isinstance(waveform, str) else waveform
+    families = {name: family(name) for name in names} or {"": ({}, {})}
+    scenes = {name: changed(scene, at, "--waveform") for name, (at, _) in families.items()}
+    least = FEWEST_RUNS + 2 * max(len({**keys, **both, **own}) for _, own in families.values())
     check_whole("--budget", budget, least, MOST_RUNS, ", for these keys,")
-    tunings, benches, made = [], [], list[Run]()
+    whole = any(key in FREQUENCIES for key in keys)
+    judge = {"run.solver": "fmu"} if scene.run.solver == "fast" else {}
+    tunings, made = list[Tuning](), list[Run]()
 
     def report(run: Run, best: Run | None) -> None:
         made.append(run)
         progress(run, best)
 
-    with ExitStack() as stack:
-        for name, (base, ranges) in families.items():
-            store = f"{name.replace(':', '-')}-{STORE}" if name else STORE
-            whole = any(key in FREQUENCIES for key in ranges)
-            path = None if out is None else Path(out) / store
-            bench = Evaluator(base, path, whole_periods=whole, workers=workers, dask=dask)
-            benches.append(stack.enter_context(bench))
-            judge = {"run.solver": "fmu"} if base.run.solver == "fast" else {}
-            made = [run for tuning in tunings for run in tuning.runs]
-            aim = bench, base, quantity, largest, ranges, len(keys) if robust else 0, most
-            trial = _Trial(*aim, judge, report)
-            try:
-                best, neighbours, ahead = _searched(trial, budget, seed, scouting)
-            except SimulationFailed as error:
-                if name == [*families][-1] and not tunings:
-                    raise
-                warnings.warn(f"{name}: {error}", Note, stacklevel=3)
-                continue
-            except KeyboardInterrupt:
-                if out is not None:
-                    write_runs(Path(out) / "tune.csv", made, quantity)
-                raise
-            except BadInput:
-                if not bench.resumed:
-                    bench.forget()  # a refused call leaves nothing to resume
-                raise
-            tuned = moved(base, {**best.values, **judge}, whole)
-            ran_ahead = (run.value for run in ahead if judge and run.values == best.values)
-            tunings.append(
-                Tuning(
-                    *(quantity, largest, ranges, trial.runs, best, neighbours, tuned, len(ahead)),
-                    *(seed, next(ran_ahead, None), name, robust, most),
-                )
-            )
-        tunings.sort(key=lambda tuning: tuning.best.value or 0.0, reverse=largest)
+    path = None if out is None else Path(out) / STORE
+    with Evaluator(scene, path, whole_periods=whole, workers=workers, dask=dask) as bench:
+        try:
+            for name, (shape, own) in families.items():
+                ranges, turns = {**keys, **both, **own}, len(keys) if robust else 0
+                aim = Aim(quantity, largest, ranges, most, seed, name, turns)
+                trial = _Trial(aim, bench, scenes[name], shape, judge, report)
+                try:
+                    tunings.append(_searched(trial, budget, whole, scouting))
+                except SimulationFailed as error:
+                    if name == [*families][-1] and not tunings:
+                        raise
+                    warnings.warn(f"{name}: {error}", Note, stacklevel=3)
+        except KeyboardInterrupt:
+            if out is not None:
+                write_runs(Path(out) / "tune.csv", made, quantity)
+            raise
+        except BadInput:
+            if not bench.resumed:
+                bench.forget()  # a refused call leaves nothing to resume
+            raise
+        tunings.sort(key=lambda tuning: tuning.value, reverse=largest)
         kind = motion(tunings[0].scene, lambda time: None)
         found = replace(tunings[0], motion=kind, others=tuple(tunings[1:]))
         if out is not None:
             found.save(out)
-            for bench in benches:
-                bench.forget()
+            bench.forget()
     return found
 
 
@@ -240,17 +226,14 @@ Progress = Callable[[Run, Run | None], None]
 
 @dataclass(eq=False)
 class _Trial:
-    """A search for the largest or least ``quantity``, on one circuit model."""
+    """A search with one solver and one circuit model."""
 
+    aim: Aim
     bench: Evaluator
     scene: Scene
-    quantity: str
-    largest: bool
-    ranges: dict[str, tuple[float, float]]
-    turned: int
-    """How many of the keys, from the first on, are turned at each setting of a robust search."""
-    heat: float
-    """Limit of the heat in a coil, W."""
+    """With the waveform that is searched."""
+    shape: Mapping[str, Any]
+    """Settings that give the evaluator's scene this waveform."""
     circuit: Settings
     """Settings that select the circuit model, or the FMU as the solver; empty: the scene's own."""
     progress: Progress
@@ -258,7 +241,7 @@ class _Trial:
     def __post_init__(self) -> None:
         self.runs: list[Run] = []
         """The run of each row of ``known.points``."""
-        self.known = Known(len(self.ranges), 1, FINE, self._run)
+        self.known = Known(len(self.aim.ranges), 1, FINE, self._run)
 
     @property
     def best(self) -> Run | None:
@@ -266,9 +249,9 @@ class _Trial:
         found = self.known.scores[: len(self.runs), 0]
         return self.runs[int(found.argmax())] if len(found) and found.max() > -inf else None
 
-    def search(self, runs: int, seed: int, warm: Array) -> None:
+    def search(self, runs: int, warm: Array) -> None:
         """Run at most ``runs`` points; ``warm`` (rows) come first and replace most exploration."""
-        keys, explored = len(self.ranges), round(EXPLORED * runs)
+        keys, seed, explored = len(self.aim.ranges), self.aim.seed, round(EXPLORED * runs)
         self.known.rows(warm[:explored])
         explored = max(explored, len(self.runs) + POPULATION)
         design = Design(keys, explored, seed)
@@ -281,18 +264,18 @@ class _Trial:
         drive = self.scene.drive
         knobs = firmware.knobs(drive.amplitude, drive.frequency, drive.offset)
         point = []
-        for name, (low, high) in self.ranges.items():
+        for name, (low, high) in self.aim.ranges.items():
             table, _, bare = name.partition(".")
             value = getattr(getattr(self.scene, table), bare, None)
             value = knobs.get(bare) if value is None else value
             if value is None or not low <= value <= high:
-                return np.empty((0, len(self.ranges)))
+                return np.empty((0, len(self.aim.ranges)))
             point.append((value - low) / (high - low))
         return np.array([point])
 
     def neighbours(self) -> dict[str, list[float | None]]:
         """The values with each key turned down and up from the best point; None if out of range."""
-        keys = list(self.ranges)
+        keys = list(self.aim.ranges)
         best = self.known.points[int(self.known.scores[:, 0].argmax())]
         # 2 n rows: all keys turned up one by one, then down; those beyond an end are clipped to it.
         turns = faces(best)
@@ -305,10 +288,10 @@ class _Trial:
         """Scores (points × 1) and feasibility of points (rows). Each point is a group of settings:
         its own, then its turns; groups are judged as they complete, and kept in order."""
         each = [
-            [self._settings(near.tolist()) for near in turned(point, self.turned)]
+            [self._settings(near.tolist()) for near in turned(point, self.aim.turned)]
             for point in points
         ]
-        asked = [[{**self.circuit, **values} for values in around] for around in each]
+        asked = [[{**self.shape, **self.circuit, **one} for one in around] for around in each]
         found: dict[int, Run] = {}
         for number, outcomes in self.bench.groups(asked):
             found[number] = self._judged(each[number][0], outcomes)
@@ -321,7 +304,7 @@ class _Trial:
     def _judged(self, settings: dict[str, Number], outcomes: Sequence[Outcome]) -> Run:
         """The run of a setting, from its own outcome (the first) and those of its turns. The heat
         limit applies to its own only, as an operator who is off turns the knob back."""
-        own, most = outcomes[0], self.heat
+        own, most = outcomes[0], self.aim.heat
         if (heat := own.numbers.get("coil_heat", 0.0)) > most:
             own = replace(own, failure=f"the heat of {heat:.3g} W in a coil is above {most:.3g} W")
             return Run(settings, own, None)
@@ -335,7 +318,7 @@ class _Trial:
     def _settings(self, point: Sequence[float]) -> dict[str, Number]:
         """The keys' values at a point of the unit cube."""
         settings: dict[str, Number] = {}
-        for (name, (low, high)), share in zip(self.ranges.items(), point, strict=True):
+        for (name, (low, high)), share in zip(self.aim.ranges.items(), point, strict=True):
             value = min(max(low + share * (high - low), low), high)
             key = numeric_key(name)
             if key.choices:
@@ -346,24 +329,23 @@ class _Trial:
     def _value(self, outcome: Outcome) -> float | None:
         if outcome.failure:
             return None
-        if self.quantity not in outcome.numbers:
-            asked, names = self.quantity, ", ".join(outcome.numbers)
+        if self.aim.quantity not in outcome.numbers:
+            asked, names = self.aim.quantity, ", ".join(outcome.numbers)
             hint = suggestion(asked, outcome.numbers) or f" ({names})"
             raise bad(f"{plain(asked)} is not a number of this scene's summary{hint}")
-        value = outcome.numbers[self.quantity]
+        value = outcome.numbers[self.aim.quantity]
         return value if isfinite(value) else None
 
     def _score(self, value: float | None) -> float:
         if value is None:
             return -inf
-        return value if self.largest else -value
+        return value if self.aim.largest else -value
 
 
-def _searched(
-    trial: _Trial, budget: int, seed: int, scouting: Progress
-) -> tuple[Run, dict[str, list[float | None]], list[Run]]:
-    """The best run, the values of its turns, and the runs of the preceding, cheaper search."""
-    faces_each = 2 * len(trial.ranges)
+def _searched(trial: _Trial, budget: int, whole_periods: bool, scouting: Progress) -> Tuning:
+    """The result of a search, with a cheaper one before it where there is a simpler model."""
+    aim = trial.aim
+    faces_each = 2 * len(aim.ranges)
     searched = min(round(SEARCHED * budget), budget - faces_each)
     ahead: list[Run] = []
     warm = trial.own()
@@ -373,13 +355,13 @@ def _searched(
         # BadInput: the simple model's summary lacks the quantity, so no search precedes.
         with nullcontext() if fast else suppress(BadInput):
             scouts = replace(trial, circuit=circuit, progress=scouting)
-            scouts.search((1 if fast else SCOUTS) * searched, seed, warm)
+            scouts.search((1 if fast else SCOUTS) * searched, warm)
             ahead = scouts.runs
             warm = np.vstack([warm, scouts.known.ranked(0, WARM_APART, WARM)])
     if fast:
         trial.known.rows(warm)  # with the FMU; the fast solver has used the search's runs
     else:
-        trial.search(searched, seed, warm)
+        trial.search(searched, warm)
     if trial.best is None:
         first = (trial.runs or ahead)[0]
         raise SimulationFailed(f"No setting could be run; the first one: {first.outcome.failure}")
@@ -387,4 +369,14 @@ def _searched(
     # A turn that is better becomes the best run; its own turns are run while the budget lasts.
     while trial.best is not best and len(trial.runs) + faces_each <= budget:
         best, neighbours = trial.best, trial.neighbours()
-    return trial.best, neighbours if trial.best is best else {}, ahead
+    scene = moved(trial.scene, {**trial.best.values, **trial.circuit}, whole_periods)
+    by_fast = (run.value for run in ahead if fast and run.values == trial.best.values)
+    return Tuning(
+        **vars(aim),
+        runs=trial.runs,
+        best=trial.best,
+        neighbours=neighbours if trial.best is best else {},
+        scene=scene,
+        scouts=len(ahead),
+        by_fast=next(by_fast, None),
+    )
