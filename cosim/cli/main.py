@@ -9,7 +9,6 @@ import gc
 import os
 import re
 import sys
-import time
 import warnings
 from collections.abc import Iterator
 from io import TextIOWrapper
@@ -18,8 +17,7 @@ from typing import Any, NoReturn
 
 from cosim.cli import simulation, studies
 from cosim.cli.command import Command, add_commands
-from cosim.errors import BadInput, CosimError, Note, SimulationFailed, plain, printable
-from cosim.files.reader import watched
+from cosim.errors import BadInput, CosimError, Note, SimulationFailed, printable
 from cosim.studies.study import Option
 from cosim.toolchain import memory
 from cosim.toolchain.interrupts import ended_alike
@@ -121,7 +119,7 @@ def main(argv: list[str] | None = None) -> int:
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # prints ? for what the encoding lacks
     try:
-        with ended_alike(), warnings.catch_warnings(), watched(_Reading()):
+        with ended_alike(), warnings.catch_warnings():
             warnings.simplefilter("always", Note)
             warnings.showwarning = _note
             argv = sys.argv[1:] if argv is None else argv
@@ -171,30 +169,7 @@ def _open_standard_streams() -> None:
             setattr(sys, name, open(os.devnull, "r+"))  # noqa: SIM115
 
 
-class _Reading:
-    """A progress bar for a file that takes long to read."""
-
-    def __init__(self) -> None:
-        self._path, self._began = "", 0.0
-        self._bar: Any = None
-
-    def __call__(self, path: str, share: float) -> None:
-        if path != self._path or share >= 1.0:
-            if self._bar is not None:
-                self._bar.close()
-            self._path, self._began, self._bar = path, time.monotonic(), None
-        if self._bar is None and share < 1.0 and time.monotonic() - self._began > _LONG:
-            from cosim.cli.command import progress_bar
-
-            name = os.path.basename(path)
-            self._bar = progress_bar(f"reading {plain(name, 40)}", 1.0, "", bar_format=_BAR)
-        if self._bar is not None:
-            self._bar.update(share - self._bar.n)
-
-
 _LONGEST = 2000  # characters of a message
-_LONG = 1.0  # s of reading before its progress is shown
-_BAR = "{desc} {percentage:3.0f}% |{bar}| {remaining} left"
 
 
 def _note(message: Warning | str, *_: object, **__: object) -> None:

@@ -7,7 +7,7 @@ quotation marks enclose a whole cell, within one line.
 """
 
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn
@@ -24,7 +24,7 @@ MOST_ROWS = 2_000_000
 MOST_CELLS = 10_000
 """Cells in a row."""
 
-_TOLD = 10_000  # rows between two reports of progress
+_MANY = 10_000  # rows of a table whose reading may take more than a second
 
 _CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029]")
 _DIGITS = r"[+-]?(?:[0-9]++{0}?[0-9]*+|{0}[0-9]++)(?:[eE][+-]?[0-9]++)?"  # {0}: decimal sign
@@ -123,14 +123,19 @@ def read_cells(path: Path) -> Cells:
     if len(kept) > MOST_ROWS:
         raise BadInput(f"{name}: it has more than {MOST_ROWS} rows.")
     rows = []
-    for n, line in kept:
+    for n, line in kept if len(kept) < _MANY else _shown(kept, path):
         if line.count(separator) >= MOST_CELLS:
             raise BadInput(f"{name}: row {n}: it has more than {MOST_CELLS} cells.")
         rows.append((n, [*_cells(line, separator, name, n)]))
-        if len(rows) % _TOLD == 0:
-            reader.tell(path, 0.5 + 0.5 * len(rows) / len(kept))
-    reader.tell(path, 1.0)
     return Cells(path, separator, rows, comments)
+
+
+def _shown(lines: list[tuple[int, str]], path: Path) -> Iterable[tuple[int, str]]:
+    """The lines, with a progress bar from a second on, where stderr is a terminal."""
+    from tqdm import tqdm
+
+    name = f"reading {plain(path.name, 40)}"
+    return tqdm(lines, name, unit="row", leave=False, delay=1.0, disable=None)
 
 
 def _decoded(data: bytes) -> str:

@@ -1,14 +1,13 @@
 """The safe reader of every file that a scene, a command or another file names.
 
 It reads regular files of limited size only: devices and pipes may never end, and some act when they
-are merely opened. A watcher, if set, is told the progress of long reading.
+are merely opened.
 """
 
 import os
 import stat
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from contextvars import ContextVar
 from io import BytesIO
 from pathlib import Path
 from typing import IO
@@ -16,10 +15,6 @@ from typing import IO
 from cosim.errors import BadInput, plain
 
 _CHUNK = 1 << 20  # bytes
-
-Watcher = Callable[[str, float], None]
-
-_watcher: ContextVar[Watcher | None] = ContextVar("watcher", default=None)
 
 
 class Refused(BadInput):
@@ -29,33 +24,13 @@ class Refused(BadInput):
     """The reason, as the end of a sentence."""
 
 
-@contextmanager
-def watched(watcher: Watcher) -> Iterator[None]:
-    """Within this context ``watcher`` is called with each file being read, and the share done."""
-    token = _watcher.set(watcher)
-    try:
-        yield
-    finally:
-        _watcher.reset(token)
-
-
-def tell(path: Path | str, share: float) -> None:
-    """Tell the watcher which share of the file is done, 0 to 1."""
-    watcher = _watcher.get()
-    if watcher is not None:
-        watcher(str(path), share)
-
-
 def read(path: Path | str, most: int) -> bytes:
     """The bytes of a regular file, at most ``most`` of them. Raises Refused."""
     with opened(path, most) as file:
         read = BytesIO()
-        size = os.fstat(file.fileno()).st_size
         while chunk := file.read(_CHUNK):
             read.write(chunk)
             _check_size(path, read.tell(), most)  # the file may grow, or have no known size
-            if size > _CHUNK:
-                tell(path, 0.5 * min(1.0, read.tell() / size))
         return read.getvalue()
 
 

@@ -1,17 +1,21 @@
 """Files that a scene or a command names: devices, pipes and endless files are refused at once."""
 
 import os
+import sys
 import threading
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
+from tqdm import tqdm
 
 import cosim
 from cosim.circuit.lint import deck
 from cosim.cli.main import main
 from cosim.errors import BadInput
-from cosim.files import reader
+from cosim.files import cells, reader
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from tests.helpers import needs
@@ -81,26 +85,33 @@ def test_one_that_takes_the_place_of_a_regular_file(
         reader.read(path, 100)
 
 
-def test_one_that_grows(tmp_path: Path) -> None:
+def test_one_that_grows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "file"
     path.write_bytes(bytes(3 << 20))
+    check = reader._check_size
 
-    def grow(*_: object) -> None:
+    def grow(*given: Any) -> None:
         with open(path, "ab") as file:
             file.write(bytes(1 << 20))
+        check(*given)
 
-    with reader.watched(grow), pytest.raises(reader.Refused, match="larger than"):
+    monkeypatch.setattr(reader, "_check_size", grow)
+    with pytest.raises(reader.Refused, match="larger than"):
         reader.read(path, 20 << 20)
 
 
-def test_long_reading_is_told(tmp_path: Path) -> None:
+def test_long_reading_is_shown_on_a_terminal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = tmp_path / "long.csv"
     rows = "".join(f"{k}e-5,0.5\n" for k in range(150_000))
     path.write_text("time [s],normal_force [N]\n" + rows)
-    shares: list[float] = []
-    with reader.watched(lambda _, share: shares.append(share)):
-        simulate(load("held", [*RUN, f"friction.normal_force_file={path}"]))
-    assert len(shares) > 10 and shares == sorted(shares) and shares[-1] == 1.0
+    cells.read_cells(path)
+    assert not capsys.readouterr().err
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setattr("tqdm.tqdm", partial(tqdm, delay=0.0))
+    assert len(cells.read_cells(path).rows) == 150_001
+    assert "reading long.csv: " in capsys.readouterr().err
 
 
 def test_readers_meet_no_lock(tmp_path: Path) -> None:
