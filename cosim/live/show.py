@@ -173,6 +173,8 @@ def _table(path: Path) -> tuple[dict[str, Any], list[Run]]:
         raise BadInput(f"{plain(path)}: this table has no column of numbers.")
     if "failure" in heads:  # of a search: its keys, then what it found, which is the colour
         ways = [*ways[:2], ways[-1]]
+    if "unit" in heads:  # one for each row, so columns without one of their own mix units
+        ways.sort(key=lambda name: not heads[name])
     cloud = {"columns": columns, "keys": [], "ways": (ways * 3)[:3], "family": None, "grid": []}
     cloud["count"] = len(cells.rows) - 1
     pictures = [p for p in path.parent.glob("*.png") if f"{p.stem}-".startswith(f"{path.stem}-")]

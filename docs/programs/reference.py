@@ -266,7 +266,8 @@ def python() -> str:
         "Everything that the command does, from a script, a notebook or standard input. The texts "
         "are in the built pages (`make docs`) and in Python: `help(cosim.run)`. Scenes are "
         "given by name, as a path of a TOML file, or as what `load` returned. Overrides are a "
-        'mapping `{"table.key": value}`, SI.'
+        'mapping `{"table.key": value}`, SI. A message names an argument as the command does: '
+        "`--budget` is `budget`."
     )
     return "\n\n".join(["# Python", about, *(f"::: cosim.{n}" for n in (*cosim.homes(), *ERRORS))])
 

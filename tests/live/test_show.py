@@ -201,6 +201,14 @@ def test_a_search_is_coloured_by_what_it_found(tmp_path: Path) -> None:
     assert _table(path)[0]["cloud"]["ways"] == ["a", "v_average", "v_average"]
 
 
+def test_a_table_opens_on_columns_of_one_unit_each(tmp_path: Path) -> None:
+    """And not on one whose rows are in mm/s and in m/s², as their column `unit` says."""
+    path = tmp_path / "limits.csv"
+    rows = "1,23,mm/s,22,151,3\n1,151,m/s²,19,151,2\n"
+    path.write_text(f"rig,value,unit,v [mm/s],a [m/s²],heat [W]\n{rows}", encoding="utf-8")
+    assert _table(path)[0]["cloud"]["ways"] == ["v", "a", "heat"]
+
+
 def test_columns_of_one_name_in_two_units_are_two(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     rows = "time [s],z [mm],z [m],v [m/s],,\n0,1,0.001,7,,\n1,2,0.002,8,,\n"

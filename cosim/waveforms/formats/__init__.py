@@ -29,9 +29,11 @@ def parse(lists: list[str], known: Collection[str], what: str) -> list[str]:
     Raises BadInput."""
     names = [name.strip() for text in lists for name in text.split(",")]
     for name in names:
-        if name not in known or names.count(name) > 1:
-            words = f"must be one of {', '.join(known)}, once"
+        if name not in known:
+            words = f"must be one of {', '.join(known)}"
             raise BadInput(f'--as: of a {what} "{plain(name)}" {words}.')
+        if names.count(name) > 1:
+            raise BadInput(f"--as: {name} must be named once.")
     return names
 
 
