@@ -426,6 +426,32 @@ def test_feedthrough_that_no_fmu_declares_is_as_exact(tmp_path: Path, version: i
         here(tmp_path / "load.toml", {})
 
 
+def test_feedthrough_one_way_that_no_fmu_declares_is_as_exact(tmp_path: Path) -> None:
+    """A diode with a resistor in series; more of u at the start, 0, leaves it blocked."""
+    recompiled(tmp_path, ("m->r[D] * m->r[U]", "m->r[D] * fmax(0.0, -m->r[U])"))
+    build(tmp_path, "Load")
+    (tmp_path / "rl.cir").write_text(f"* load\n{RL}Vf y 0 0\n.end\n")
+    (tmp_path / "load.toml").write_text(LOAD.replace('"load.u"', '"load.u"\nscale = -1'))
+    run, plain, fine = against_one_netlist(
+        tmp_path, "B2 z 0 V=10*max(0,i(B2))", {"fmu.load.D": 10.0}
+    )
+    assert error(run, fine) <= 1.5 * apart(plain["time"], plain["vf#branch"], fine)
+
+
+def test_feedthrough_of_a_product_that_no_fmu_declares_is_as_exact(tmp_path: Path) -> None:
+    """Of two inputs that begin at 0, so that neither alone changes it."""
+    recompiled(tmp_path, ("m->r[D] * m->r[U]", "m->r[D] * m->r[U] * m->r[X1]"))
+    build(tmp_path, "Load", 3)
+    (tmp_path / "rl.cir").write_text(f"* load\n{RL}Vf y 0 0\n.end\n")
+    other = '[[port]]\nprobe = "abs(i(Vf))"\nto = "load.x[1]"\n[run]'
+    (tmp_path / "load.toml").write_text(LOAD.replace("[run]", other))
+    run, plain, fine = against_one_netlist(
+        tmp_path, "B2 z 0 V=10*i(B2)*abs(i(B2))", {"fmu.load.D": 10.0}
+    )
+    time, current = run.log.array()[:, 0], run.log.array()[:, 2]
+    assert apart(time, current, fine) <= 1.5 * apart(plain["time"], plain["vf#branch"], fine)
+
+
 def test_feedthrough_of_an_input_that_cannot_be_read_is_as_exact(tmp_path: Path) -> None:
     """An element of an array, which the FMU takes but does not give back."""
     recompiled(tmp_path, ("m->r[D] * m->r[U]", "m->r[D] * m->r[X1]"))

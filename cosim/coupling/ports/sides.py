@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from ctypes import c_double, c_uint32, c_void_p
 from functools import cached_property
-from itertools import accumulate
+from itertools import accumulate, product
 from typing import Any
 
 import numpy as np
@@ -108,14 +108,17 @@ class Side:
             getattr(raw, f"set{into.type}")([into.reference], values.tolist())
 
         found: set[str] = set()
+        reals = [each for each in self.inputs if each.real]
         with suppress(Exception):  # what fails here fails again in the run, which tells it
             before = get()
-            for into in filter(lambda each: each.real, self.inputs):
+            # Both ways, as max(0, -u) does not answer to more of u; each on those that were moved
+            # before it, as a product of inputs at zero answers to none alone.
+            for way, into in product((1.0, 0.0, -1.0, 0.0), reals):
                 start = np.array(self._start(into))  # an FMU may not let an input be read
-                put(into, start + _NUDGE * np.maximum(np.abs(start), 1.0))
-                if not np.array_equal(get(), before, equal_nan=True):
+                put(into, start + way * _NUDGE * np.maximum(np.abs(start), 1.0))
+                if not np.array_equal(now := get(), before, equal_nan=True):
                     found.add(into.name)
-                put(into, start)
+                before = now
         return found
 
     def _start(self, into: Variable) -> list[float]:
