@@ -39,6 +39,8 @@ def _run(
 
         def progress(reached: float) -> None:
             bar.update(reached - bar.n)
+            if strict and reached >= base.run.duration:
+                bar.set_description(f"{base.name}: done; finer runs go on")
 
         with (
             progress_bar(base.name, base.run.duration, "s", delay=1.0, bar_format=_BAR) as bar,

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tqdm import tqdm
 
 import cosim
 from cosim.scene import load
@@ -204,11 +205,17 @@ def test_where_nothing_repeats_no_kind_is_told() -> None:
         assert kind(scene) == {}
 
 
-def test_the_strict_error_is_from_other_runs_of_the_same_circuit(tmp_path: Path) -> None:
+def test_the_strict_error_is_from_other_runs_of_the_same_circuit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Which the bar tells, as it is at its end long before them."""
     command = ["run", "reference", "--error", "--set", "run.duration=0.3", "--out", str(tmp_path)]
     from cosim.cli.main import main
 
+    said: list[str] = []
+    monkeypatch.setattr(tqdm, "set_description", lambda bar, words: said.append(words))
     assert main(command) == 0
+    assert said[-1] == "reference: done; finer runs go on"
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert 0.0 < summary["v_average_error"] < 1e-4 * abs(summary["v_average"]) + 1e-6
     assert len(summary["v_average_other_starts"]) == 3
