@@ -522,15 +522,15 @@ def test_missing_frames_have_no_residual(folder: Path, tmp_path: Path) -> None:
         columns["z_surface"][:2] = np.nan
         write(tmp_path, label, columns)
     own = np.array([OWN[label] for label in OWN])
-    rigs, worst = np.repeat(space.rigs(point()[None]), 3, axis=0), []
+    rigs, worst = space.rigs(point()[None]), []
     for where in (folder, tmp_path):
         trials = read_trials(where, space)
-        found, costs = chain.refine([one.fine for one in trials], rigs, own.copy(), 3, 1)
+        found, costs = chain.refine([t.fine for t in trials], rigs, own[None, :, None], 3, 1)
         worst.append(costs.max())
-        rows = [errors(t, rigs[0], one) for t, one in zip(trials, found, strict=True)]
+        rows = [errors(t, rigs[0], one) for t, one in zip(trials, found[0, :, 0], strict=True)]
         assert max(row["part_error_mm"] for row in rows) < 0.01
         assert all(np.isfinite(row["v_average_mm_per_s"]) for row in rows)
-        assert all(bands(t, rigs[0], one) for t, one in zip(trials, found, strict=True))
+        assert all(bands(t, rigs[0], one) for t, one in zip(trials, found[0, :, 0], strict=True))
         assert [t.frequency for t in trials] == pytest.approx([9.8, 20.2, 50.8], rel=0.02)
     assert worst[1] < 2.0 * worst[0] + 1e-3
 

@@ -93,11 +93,11 @@ def refine(
 ) -> tuple[Array, Array]:
     """Fit own parameters, by ``rounds`` of Gauss–Newton from ``own`` on.
 
-    ``targets`` (n), ``rigs`` (n × RIG) and ``own`` (n × OWN) belong to each other row by row.
-    Returns the parameters found (n × OWN) and their costs (n).
+    ``own`` (n × targets × m × OWN) has m sets for each of n rigs (n × RIG) and each target.
+    Returns the parameters found, in this shape, and their costs (n × targets × m).
     """
-    rigs, own = np.ascontiguousarray(rigs), np.array(own, dtype=np.float64, order="C")
-    cost = np.empty(len(targets))
+    own = np.array(own, dtype=np.float64, order="C")
+    cost = np.empty(own.shape[:-1])
     _work(targets, rigs, own, cost, rounds, workers)
     return own, cost
 
@@ -105,44 +105,44 @@ def refine(
 def look_around(
     targets: Sequence[Target], rigs: Array, own: Array, workers: int
 ) -> tuple[Array, Array]:
-    """Costs (n × m) of m sets of own parameters (n × m × OWN) for each target and rig (n × RIG).
+    """Costs (n × targets × m) of own parameters, which are shaped as for :func:`refine`.
 
     Each phase is first shifted to where the simulated surface fits the measured one best, if that
     lowers the cost. Returns the own parameters with these phases, and the costs.
     """
-    n, m, _ = own.shape
-    # A job simulates LANES sets side by side. The m sets of each target are padded with copies of
-    # the first one to whole blocks, which become rows: n blocks × LANES × OWN.
+    n, trials, m, _ = own.shape
+    # A job simulates LANES sets side by side. The m sets are padded with copies of the first one
+    # to whole blocks.
     blocks = -(-m // LANES)
-    padded = np.concatenate([own, np.repeat(own[:, :1], blocks * LANES - m, axis=1)], axis=1)
-    padded = np.ascontiguousarray(padded).reshape(n * blocks, LANES, len(OWN))
-    found = np.empty((n * blocks, LANES))
-    wide = np.ascontiguousarray(np.repeat(rigs, blocks, axis=0))
-    _work([t for t in targets for _ in range(blocks)], wide, padded, found, 0, workers)
-    return padded.reshape(n, -1, len(OWN))[:, :m], found.reshape(n, -1)[:, :m]
+    padding = np.repeat(own[:, :, :1], blocks * LANES - m, axis=2)
+    padded = np.concatenate([own, padding], axis=2).reshape(n, trials, blocks, LANES, len(OWN))
+    cost = np.empty(padded.shape[:-1])
+    _work(targets, rigs, padded, cost, 0, workers)
+    padded, cost = padded.reshape(n, trials, -1, len(OWN)), cost.reshape(n, trials, -1)
+    return padded[:, :, :m], cost[:, :, :m]
 
 
 def _work(
     targets: Sequence[Target], rigs: Array, own: Array, cost: Array, rounds: int, workers: int
 ) -> None:
-    """Do a job for each row of ``rigs``, ``own`` and ``cost``; the last two are changed in place.
+    """Do a job for each of the rigs (n × RIG), each target, and each row of the third axis of
+    ``own`` and ``cost``, which begin with these three axes; both are changed in place.
     ``next_job``, an atomic counter that all threads share, deals out the jobs."""
-    n, next_job = len(targets), c_longlong(0)
-    jobs = np.zeros(n, _Job)
-    jobs["trial"], jobs["rounds"] = [target.address for target in targets], rounds
-    for name, array in (("rig", rigs), ("own", own), ("cost", cost)):
-        jobs[name] = array.ctypes.data + np.arange(n) * array.strides[0]  # the address of each row
+    rigs, shape = np.ascontiguousarray(rigs), cost.shape[:3]
+    jobs, next_job = np.zeros(shape, _Job), c_longlong(0)
+    jobs["rounds"] = rounds
+    jobs["trial"] = np.array([target.address for target in targets])[:, None]
+    jobs["rig"] = (rigs.ctypes.data + np.arange(len(rigs)) * rigs.strides[0])[:, None, None]
+    for name, array in (("own", own), ("cost", cost)):  # the address of each row
+        rows = np.arange(jobs.size).reshape(shape)
+        jobs[name] = array.ctypes.data + rows * array.strides[2]
 
     def work(_: int) -> int:
-        return library("stepper").chain_work(jobs.ctypes.data, n, byref(next_job))
+        return library("stepper").chain_work(jobs.ctypes.data, jobs.size, byref(next_job))
 
-    threads = range(min(workers, n))
-    if len(threads) == 1:
-        failed = [work(0)]
-    else:
-        with ThreadPoolExecutor(len(threads)) as pool:
-            failed = [*pool.map(work, threads)]
-    if any(failed):
+    with ThreadPoolExecutor(workers) as pool:
+        failed = any([*pool.map(work, range(workers))])
+    if failed:
         raise SimulationFailed("There is no memory for the simulation of the trials.")
 
 

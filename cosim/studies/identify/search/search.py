@@ -99,21 +99,24 @@ def best_of(several: Sequence[Found]) -> Found:
 
 
 def _started(targets: Sequence[Target], own: Array) -> Array:
-    """Own parameters (n × m × OWN), each unchanged and with STARTS other start times of the drive:
-    n × m (1 + STARTS) × OWN. The start times are the centres of equal parts of their range."""
+    """Own parameters (n × trials × m × OWN), each unchanged and with STARTS other start times of
+    the drive: n × trials × m (1 + STARTS) × OWN. The start times are the centres of equal parts of
+    their range."""
     k = OWN.index("start")
-    found = np.repeat(own[:, :, None], 1 + STARTS, axis=2)
-    for rows, target in zip(found, targets, strict=True):
+    found = np.repeat(own[:, :, :, None], 1 + STARTS, axis=3)
+    for t, target in enumerate(targets):
         if target.scale[k] > 0.0:
-            rows[:, 1:, k] = target.low[k] + (np.arange(STARTS) + 0.5) / STARTS * target.scale[k]
-    return found.reshape(len(own), -1, len(OWN))
+            times = target.low[k] + (np.arange(STARTS) + 0.5) / STARTS * target.scale[k]
+            found[:, t, :, 1:, k] = times
+    return found.reshape(*own.shape[:2], -1, len(OWN))
 
 
 def _best(own: Array, cost: Array, kept: int) -> tuple[Array, Array]:
-    """The ``kept`` cheapest of own parameters (n × m × OWN) with costs (n × m), in each row."""
-    order = np.argsort(cost, axis=1)[:, :kept]
-    best = np.take_along_axis(own, order[:, :, None], axis=1)
-    return best, np.take_along_axis(cost, order, 1)
+    """The ``kept`` cheapest of the m own parameters (n × trials × m × OWN) with costs (n × trials ×
+    m), for each rig and trial."""
+    order = np.argsort(cost, axis=2)[:, :, :kept]
+    best = np.take_along_axis(own, order[..., None], axis=2)
+    return best, np.take_along_axis(cost, order, axis=2)
 
 
 def _inherited(points: Array, parents: Array, parents_own: Array, follow: Array) -> Array:
@@ -147,47 +150,29 @@ class Search:
         """``low``, ``high`` or ``scale`` of all targets (trials × OWN)."""
         return np.array([getattr(target, name) for target in self.targets])
 
+    def fitted(self, points: Array, own: Array, rounds: int) -> tuple[Array, Array]:
+        """Own parameters (n × trials × m × OWN) fitted on rigs (n × free), and their costs."""
+        return refine(self.targets, self.space.rigs(points), own, rounds, self.workers)
+
     def refined(self, point: Array, own: Array, rounds: int) -> Found:
         """The solution on a given rig, its own parameters fitted from ``own`` on."""
-        rigs = np.repeat(self.space.rigs(point[None]), len(self.targets), axis=0)
-        return Found(self.space, point, *refine(self.targets, rigs, own, rounds, self.workers))
+        found, costs = self.fitted(point[None], own[None, :, None], rounds)
+        return Found(self.space, point, found[0, :, 0], costs[0, :, 0])
 
     def screen(
         self, points: Array, rng: np.random.Generator, count: int, kept: int, rounds: int
     ) -> list[Found]:
         """For each rig (n × free) and trial the best of ``count`` random own parameters: the
         ``kept`` cheapest ones are refined, tried with other start times, and refined again."""
-        trials = len(self.targets)
-        # From here on a row for each pair of rig and trial, all trials of the first rig first.
-        rigs = np.repeat(self.space.rigs(points), trials, axis=0)
-        each = [*self.targets] * len(points)
-        drawn = np.stack([draws(target, count, rng) for target in each])
-        own, cost = _best(*look_around(each, rigs, drawn, self.workers), kept)
-        own, cost = self._refined_each(each, rigs, own, 1)
+        targets, rigs = self.targets, self.space.rigs(points)
+        own = np.array([[draws(target, count, rng) for target in targets] for _ in points])
+        own, _ = _best(*look_around(targets, rigs, own, self.workers), kept)
+        own, _ = self.fitted(points, own, 1)
         # The cost is rugged over the drive's start time: a grid over its whole range is tried.
-        own, cost = _best(*look_around(each, rigs, _started(each, own), self.workers), kept)
-        own, cost = _best(*self._refined_each(each, rigs, own, rounds), 1)
-        shape = (len(points), trials)
-        solutions = zip(points, own.reshape(*shape, len(OWN)), cost.reshape(shape), strict=True)
+        own, _ = _best(*look_around(targets, rigs, _started(targets, own), self.workers), kept)
+        own, cost = _best(*self.fitted(points, own, rounds), 1)
+        solutions = zip(points, own[:, :, 0], cost[:, :, 0], strict=True)
         return [Found(self.space, *solution) for solution in solutions]
-
-    def _refined_each(
-        self, targets: Sequence[Target], rigs: Array, own: Array, rounds: int
-    ) -> tuple[Array, Array]:
-        """Own parameters (n × m × OWN) fitted, m for each of n targets and rigs; costs (n × m)."""
-        n, m, _ = own.shape
-        each = [target for target in targets for _ in range(m)]
-        wide = np.repeat(rigs, m, axis=0)
-        found, cost = refine(each, wide, own.reshape(n * m, -1), rounds, self.workers)
-        return found.reshape(own.shape), cost.reshape(n, m)
-
-    def _refined_once(self, points: Array, own: Array) -> tuple[Array, Array]:
-        """Own parameters of rigs (n × trials × OWN), within bounds, fitted in one round; costs."""
-        rigs = np.repeat(self.space.rigs(points), len(self.targets), axis=0)
-        own = np.clip(own, self.bounds("low"), self.bounds("high"))
-        pairs = own.reshape(-1, len(OWN))  # a row for each pair of rig and trial
-        found, costs = refine([*self.targets] * len(points), rigs, pairs, 1, self.workers)
-        return found.reshape(own.shape), costs.reshape(own.shape[:2])
 
     def rescreened(
         self, found: Found, rng: np.random.Generator, count: int, kept: int, rounds: int
@@ -202,18 +187,15 @@ class Search:
     def borrowed(self, found: Found, others: Sequence[Found]) -> Found:
         """The solution on the same rig, with another solution's own parameters for each trial which
         they fit better; its drives are scaled to give the same coil force on this rig."""
-        # ``tried`` is solutions × trials × OWN until it is transposed to trials × solutions × OWN.
-        # The first solution is ``found``.
         solutions = [found, *others]
         rigs = self.space.rigs(np.array([one.point for one in solutions]))
         force = rigs[:, RIG.index("force_factor")]
-        tried = np.array([one.own for one in solutions])
+        tried = np.array([one.own for one in solutions])  # solutions × trials × OWN
         drives = [OWN.index(name) for name in ("amplitude", "offset")]
         tried[:, :, drives] *= (force / force[0])[:, None, None]
         tried = np.clip(tried, self.bounds("low"), self.bounds("high")).transpose(1, 0, 2)
-        rig = np.repeat(rigs[:1], len(self.targets), axis=0)
-        own, cost = _best(*self._refined_each(self.targets, rig, tried, 3), 1)
-        return Found(self.space, found.point, own[:, 0], cost[:, 0])
+        own, cost = _best(*self.fitted(found.point[None], tried[None], 3), 1)
+        return Found(self.space, found.point, own[0, :, 0], cost[0, :, 0])
 
     def slopes(self, point: Array, own: Array, k: int) -> Array:
         """Derivatives of the residuals of trial ``k`` (columns) by the rig's d coordinates, then by
@@ -253,11 +235,8 @@ class Search:
 
     def each(self, work: Callable[[int], Any]) -> list[Any]:
         """The results of ``work`` for the number of each target, in ``workers`` threads."""
-        numbers = range(len(self.targets))
-        if self.workers == 1:
-            return [work(k) for k in numbers]
         with ThreadPoolExecutor(self.workers) as pool:
-            return [*pool.map(work, numbers)]
+            return [*pool.map(work, range(len(self.targets)))]
 
     def nested(
         self,
@@ -283,7 +262,8 @@ class Search:
             asked = [search.ask() for _ in range(POPULATION)]
             points = np.array(asked)
             begun = _inherited(points, parents, parents_own, follow)
-            own, costs = self._refined_once(points, begun)
+            begun = np.clip(begun, self.bounds("low"), self.bounds("high"))
+            own, costs = (x[:, :, 0] for x in self.fitted(points, begun[:, :, None], 1))
             whole = totals(self.space, costs, points)
             search.tell([*zip(asked, whole.tolist(), strict=True)])
             k = int(whole.argmin())
