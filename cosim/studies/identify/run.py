@@ -14,7 +14,6 @@ from cosim.errors import BadInput, plain
 from cosim.evaluate.evaluator import workers_asked
 from cosim.evaluate.store import Store, reported
 from cosim.files.picture import Picture
-from cosim.scene import KEYS
 from cosim.studies.identify.problem.space import Space, read_space
 from cosim.studies.identify.problem.targets import WEIGHTS, Measured, own_parameters, read_trials
 from cosim.studies.identify.report import figures, files, solved
@@ -69,7 +68,7 @@ def identify(
 
     ``numbers`` of what comes back is what ``identify.json`` holds: ``rig``, keys and values, SI,
     ``verdicts`` on how well each key is known, ``trials`` with errors and their own drives,
-    ``ensemble``, the rigs that may be meant, and checks by ``held_out`` trials and ``made_up_rig``.
+    ``ensemble``, the rigs that may be meant, and a check by ``held_out`` trials.
     The method: :mod:`cosim.studies.identify.search.plan`. Raises BadInput.
     """
     check_seed(seed)
@@ -125,7 +124,6 @@ def _identified(
     fold_rigs, held_out = _folds(plan, trials) if len(trials) >= 3 else ([], [])
     apart_own, rows_apart = _apart(plan, best, apart)
     rows, checks = solved.told_of_trials(trials, best)
-    made_up = solved.errors_on(_made_up(plans[0][0]), trials)
     means = {kind: solved.overall([row[kind] for row in held_out]) for kind in solved.KINDS}
     numbers = {
         "cost": best.total,
@@ -136,7 +134,6 @@ def _identified(
         "apart": rows_apart,
         "held_out": held_out,
         "held_out_overall": means if held_out else None,
-        "made_up_rig": {"overall": solved.overall(made_up), "trials": made_up},
         "exact_rungs_v_average_mm_per_s": checks,
         "bands": [
             row
@@ -197,12 +194,3 @@ def _folds(plan: Plan, trials: Sequence[Measured]) -> tuple[list[Found], list[Ro
                 for kind, own in zip(solved.KINDS, owns, strict=True)
             }
     return rigs, [held_out[k] for k in sorted(held_out)]
-
-
-def _made_up(plan: Plan) -> Found:
-    """The rig of the scene keys' defaults, clipped to the bounds, with its best own parameters."""
-    space = plan.fine.space
-    defaults: list[Any] = [KEYS[entry.key].default for entry in space.free]
-    ends = zip(defaults, space.free, strict=True)
-    values = [np.clip(default, entry.low, entry.high) for default, entry in ends]
-    return plan.drives("made-up rig", space.point(np.array(values)), plan.fine)

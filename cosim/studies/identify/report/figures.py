@@ -67,11 +67,10 @@ def overlays(found: Solved) -> Picture:
 
 
 def errors(found: Solved) -> Picture:
-    """Errors of each trial beside the floor of its own repeatability and beside other rigs."""
+    """Errors of each trial beside the floor of its own repeatability, and with held-out rigs."""
     numbers, rows = found.numbers, found.numbers["trials"]
     at, names = np.arange(len(rows)), [row["trial"] for row in rows]
-    series = [("rig of the defaults, best drives", "0.75", numbers["made_up_rig"]["trials"])]
-    series.append(("identified rig", SIMULATED, rows))
+    series = [("identified rig", SIMULATED, rows)]
     held = {one["trial"]: one for one in numbers["held_out"]}
     for kind, color in zip(KINDS, (OTHER, "#8fb8da"), strict=True):
         words = f"held out, drive from {kind.replace('_', ' ')}"

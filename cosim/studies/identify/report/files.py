@@ -10,7 +10,7 @@ from cosim.studies.identify.problem.gauges import GAUGES
 from cosim.studies.identify.problem.space import OWN_KEYS
 from cosim.studies.identify.report import figures
 from cosim.studies.identify.report.scenes import rounded, scene_file, trial_settings
-from cosim.studies.identify.report.solved import Solved
+from cosim.studies.identify.report.solved import KINDS, Solved
 from cosim.studies.report import Report, Row, markdown
 from cosim.waveforms.quantities import label, percent
 
@@ -25,18 +25,17 @@ COLUMNS = {
 }
 """Headings of the tables' columns, by the names in ``identify.json``."""
 
-LINE = {
-    "trial": "trial",
-    "nrmse_v_surface": "velocity",
-    "nrmse_z_surface": "height",
-    "floor_late": "floor",
-    "part_error_mm": "part [mm]",
-    "v_average_mm_per_s": "v_average [mm/s]",
-    "v_average_measured_mm_per_s": "measured",
-}
-"""Headings of the summary's columns, by the names in ``identify.json``."""
-
 MEAN = {"trial": "mean"}
+
+HELD_OUT = {
+    kind: f"Held out: rig from the other folds, own numbers from the trial's {words}"
+    for kind, words in zip(KINDS, ("surface alone", "surface and part"), strict=True)
+}
+"""Headings of the tables of held-out trials."""
+
+NOT_FITTED = "Trials that were not fitted"
+PRINTED = ("The rig", "Laws of the suspension", "The trials", NOT_FITTED, HELD_OUT["surface"])
+"""Headings of the tables that are printed."""
 
 NOTES = (
     "One rig for all trials; amplitude, offset, phase, start, frequency, height at rest and normal "
@@ -141,21 +140,12 @@ def findings(numbers: dict[str, Any]) -> list[str]:
 
 
 def summary(found: Solved) -> str:
-    """The rig with its verdicts, and the errors trial by trial."""
-    numbers = found.numbers
-    every = [*numbers["trials"]]
-    every += [row | {"trial": f"{row['trial']} (not fitted)"} for row in numbers["apart"]]
-    every += _mean_and_worst(numbers["overall"])
-    if held := numbers["held_out_overall"]:  # with the rig of the other folds
-        every += _mean_and_worst(held["surface"], "held out, ")
-    table = [{words: row.get(name) for name, words in LINE.items()} for row in every]
-    lines = [*markdown(tables(numbers)["The rig"]), "", *findings(numbers), ""]
-    return "\n".join([*lines, *markdown(table), "", f"cost {numbers['cost']:.4f}"])
-
-
-def _mean_and_worst(overall: Row, of: str = "") -> list[Row]:
-    worst = overall["nrmse_v_surface_worst"]
-    return [overall | {"trial": f"{of}mean"}, {"trial": f"{of}worst", "nrmse_v_surface": worst}]
+    """What is printed: the findings, and some of the report's tables."""
+    lines = findings(found.numbers)
+    for heading, rows in tables(found.numbers).items():
+        if heading in PRINTED:
+            lines += ["", f"{heading}:", *markdown(rows)]
+    return "\n".join(lines)
 
 
 def _between(row: Row, unit: str) -> str:
@@ -193,15 +183,11 @@ def tables(numbers: dict[str, Any]) -> dict[str, list[Row]]:
         "The trials": [*map(_told, numbers["trials"]), whole],
     }
     if numbers["apart"]:
-        tables["Trials that were not fitted"] = [*map(_told, numbers["apart"])]
-    for kind, words in (("surface", "surface alone"), ("surface_and_part", "surface and part")):
+        tables[NOT_FITTED] = [*map(_told, numbers["apart"])]
+    for kind, heading in HELD_OUT.items():
         if numbers["held_out"]:
-            heading = f"Held out: rig from the other folds, own numbers from the trial's {words}"
             rows = [_told(one[kind]) for one in numbers["held_out"]]
             tables[heading] = [*rows, _told(numbers["held_out_overall"][kind] | MEAN)]
-    made_up = numbers["made_up_rig"]
-    heading = "The rig of the scenes' defaults with its best drives"
-    tables[heading] = [*map(_told, made_up["trials"]), _told(made_up["overall"] | MEAN)]
     if checks := numbers["exact_rungs_v_average_mm_per_s"]:
         names = ("trial", "steps", "limited", "amplifier")
         tables["v_average [mm/s] by the search's steps and on the bench's rungs"] = [
