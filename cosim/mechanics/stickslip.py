@@ -22,15 +22,9 @@ from cosim.stepper.stepper import RIG, numbers
 from cosim.toolchain.libraries import library
 
 STEP_OUTPUTS = (
-    *(
-        "back_emf",
-        "back_emf_slope",
-        "motional_flux",
-        "time_to_impact",
-        "a_surface_max",
-        "a_surface_min",
-    ),
-    *("v_surface_max", "v_surface_min", "z_surface_max", "z_surface_min"),
+    *("back_emf", "back_emf_slope", "motional_flux", "time_to_impact"),
+    *("a_surface_max", "a_surface_min", "v_surface_max", "v_surface_min"),
+    *("z_surface_max", "z_surface_min"),
 )
 """Outputs that are read after every interval of the inputs: back-EMF of one coil (V, V/s) and its
 integral over time (Wb), and extremes since the inputs were set last."""
