@@ -53,7 +53,7 @@ class Deck:
     measures: Sequence[Measure] = ()
     """The netlist's own ``.meas``."""
     notes: Sequence[str] = ()
-    """Sentences on lines of the netlist that have no effect."""
+    """Sentences on lines of the netlist that have no effect, and on random numbers."""
     devices: Sequence[str] = ()
     """For the first vectors the device parameter that has the value within a step, or ""."""
 
@@ -128,9 +128,15 @@ _RANDOM = re.compile(r"(?<![\w.])(?:a?gauss|a?unif|trnoise|trrandom)(?=\s*\()", 
 _SEEDED = re.compile(r"^\.opt\w*\s(?:.*\s)?seed\s*=", re.IGNORECASE | re.MULTILINE)
 
 
-def drawn(text: str) -> list[str]:
-    """What draws random numbers in a netlist."""
-    return [*dict.fromkeys(match[0].lower() for match in _RANDOM.finditer(text))]
+def _remark(random: Sequence[str]) -> Iterator[str]:
+    """A sentence on the functions and sources of a netlist that draw random numbers."""
+    if noise := [name for name in random if name.startswith("tr")]:
+        yield f"the values of {' and '.join(noise)} are random, and differ from run to run."
+    elif random:
+        yield (
+            f"the random numbers of {', '.join(random)} are the same in each run; "
+            ".options seed=N in the netlist draws others (it is 1 without)."
+        )
 
 
 @dataclass(frozen=True)
@@ -167,7 +173,8 @@ class Checked:
                 own = written(line, element, values if holder is self.top else {})
                 text.append("".join([own, *free]))
         lines = "\n".join(text)
-        if drawn(lines) and not _SEEDED.search(lines):
+        random = [*dict.fromkeys(match[0].lower() for match in _RANDOM.finditer(lines))]
+        if random and not _SEEDED.search(lines):
             text.append(".options seed=1")
         min_break = max(_ONE_BREAK * max_step, _ONE_TIME * duration)
         text += [
@@ -178,7 +185,7 @@ class Checked:
             f".tran {edges.length or max_step!r} {duration!r} 0 {max_step!r}",
             ".end",
         ]
-        notes = [*without_effect(self.dropped)]
+        notes = [*without_effect(self.dropped), *_remark(random)]
         return Deck("\n".join(text), vectors, edges, self.measures, notes)
 
     def _edges(self, external: Collection[Line], max_step: float, duration: float) -> Edges:

@@ -22,7 +22,7 @@ from typing import Any, ClassVar
 from PySpice.Spice.NgSpice import Shared
 
 from cosim.circuit.dialect.words import sent
-from cosim.circuit.joined import Deck, drawn
+from cosim.circuit.joined import Deck
 from cosim.errors import BadInput, SimulationFailed, plain
 from cosim.toolchain.libraries import library, ngspice_library
 from cosim.toolchain.serving import retire
@@ -107,8 +107,6 @@ class Engine(Shared.NgSpiceShared):
     sent: tuple[str, ...] = ()
     """The names of all vectors of the run, in the order in which ngspice sends them."""
     _looser = False
-    _deck = ""
-    """The last run's."""
     poisoned = False
     """ngspice has asked to exit: its library in this process can run nothing any more."""
 
@@ -170,7 +168,6 @@ class Engine(Shared.NgSpiceShared):
 
     def _load(self, deck: str) -> None:
         given = deck.splitlines()
-        self._deck = deck
         if self._looser:
             given.insert(-1, f".options {LOOSER}")
         lines = [_ffi.new("char[]", line.encode()) for line in (*given, "")]
@@ -223,14 +220,6 @@ class Engine(Shared.NgSpiceShared):
         said = "\n".join((*self._stderr, *self._stdout))
         if unknown := dict.fromkeys(re.findall(r"unrecognized parameter \((\w+)\)", said)):
             yield f"ngspice knows no {', '.join(unknown)} of a model, and ignored it."
-        random = drawn(self._deck)
-        if noise := [name for name in random if name.startswith("tr")]:
-            yield f"the values of {' and '.join(noise)} are random, and differ from run to run."
-        elif random:
-            yield (
-                f"the random numbers of {', '.join(random)} are the same in each run; "
-                ".options seed=N in the netlist draws others (it is 1 without)."
-            )
         if "Transient op finished" in said:
             yield (
                 "ngspice found no operating point, as of a circuit that oscillates, and starts "
