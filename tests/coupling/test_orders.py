@@ -15,7 +15,6 @@ import pytest
 pytest.importorskip("sksundae")
 
 from benchmarks.error_control import ErrorControlled
-from cosim.coupling.methods.gauss_seidel import GaussSeidel
 from cosim.coupling.methods.jacobi import Jacobi
 from cosim.coupling.participants.stickslip import FmuMechanics
 from cosim.coupling.rewind.joint import EventAware, Joint
@@ -79,7 +78,6 @@ QUICK = ("Jacobi k = 1", "EMF's slope, linear current")
 """One of each way to step once: both sides at the same time, and in turn."""
 EXTRA: dict[str, tuple[Make, int]] = {
     "Jacobi k = 1, slopes": (lambda a, b: Joint(a, b, Jacobi(1)), 2),
-    "held EMF, linear current": (lambda a, b: Joint(a, b, GaussSeidel(0, feed=1)), 1),
 }
 METHODS = {name: (one.make, one.order) for name, one in variants().items()} | EXTRA
 """Methods and their orders."""

@@ -23,9 +23,6 @@ class Companion(Method):
     name = "companion"
     carries_inertia = True
 
-    def __init__(self) -> None:
-        super().__init__(1, slopes=True)
-
     @property
     def order(self) -> int:
         return 2

@@ -2,9 +2,9 @@
 
 Order k + 1 with the back-EMF extrapolated by polynomials of degree k (Busch 2016, as in
 :mod:`cosim.coupling.methods.jacobi`). The current that the mechanics are fed is a polynomial of
-degree ``feed`` that ends with the circuit's step: 0, the value there; 1, linear between its ends;
-2, the parabola through one point more. The feed limits the order to ``feed`` + 1. Known limits:
-stable up to about twice Jacobi's step; nothing restarts the extrapolation at an event.
+the same degree that ends with the circuit's step: 0, the value there; 1, linear between its ends;
+2, the parabola through one point more. Known limits: stable up to about twice Jacobi's step;
+nothing restarts the extrapolation at an event.
 """
 
 from functools import partial
@@ -18,17 +18,12 @@ class GaussSeidel(Method):
 
     name = "gauss-seidel"
 
-    def __init__(self, degree: int = 1, slopes: bool = True, feed: int | None = None) -> None:
-        """``feed`` is ``degree`` unless given."""
-        super().__init__(degree, slopes)
-        self._feed = degree if feed is None else feed
-
     @property
     def order(self) -> int:
-        return min(self.degree, self._feed) + 1
+        return self.degree + 1
 
     def current(self, past: Past) -> Polynomial:
-        return past.current.polynomial_to(past.h, past.end, self._feed)
+        return past.current.polynomial_to(past.h, past.end, self.degree)
 
 
 GaussSeidel.variants = {

@@ -26,8 +26,5 @@ class StepLocked(GaussSeidel):
 
     name = "step-locked"
 
-    def __init__(self) -> None:
-        super().__init__(1, slopes=True)
-
 
 StepLocked.variants = {"EMF's slope, linear current": StepLocked}
