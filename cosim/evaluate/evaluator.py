@@ -4,8 +4,8 @@ All studies of many runs use it. A point that crashes or hangs does not affect t
 """
 
 from collections import deque
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, ExitStack, nullcontext
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from contextlib import ExitStack, nullcontext
 from functools import partial
 from itertools import groupby, islice
 from pathlib import Path
@@ -60,13 +60,17 @@ class Evaluator:
         self._whole_periods, self._kept = whole_periods, kept
         self._workers, self._dask = workers_asked(workers), dask
         self._far: Pool | None = None
-        self._stack = ExitStack()
+        """The cluster, which stays connected."""
         self._store = Store(path, inputs(scene) if path else None, whole_periods, *asked)
         self.resumed = self._store.resumed
         """Outcomes that stood in the file."""
 
     def __enter__(self) -> Self:
-        self._stack.enter_context(self._store)
+        with ExitStack() as stack:
+            stack.enter_context(self._store)
+            if self._dask is not None:
+                self._far = stack.enter_context(cluster(self._scene, self._dask))
+            self._stack = stack.pop_all()
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -112,14 +116,6 @@ class Evaluator:
                 yield known.popleft()
         yield from known
 
-    def apply(
-        self, call: Callable[..., object], points: Iterable[int]
-    ) -> Iterator[tuple[int, object]]:
-        """The result of ``call(scene, number, progress)``, or its exception, for each number, in
-        ``workers`` threads of this machine; for results that no store holds, such as waveforms."""
-        with threads(self._scene, self._workers) as pool:
-            yield from each(pool, call, points)
-
     def forget(self) -> None:
         """The study is done: remove the file."""
         self._store.remove()
@@ -140,24 +136,17 @@ class Evaluator:
 
     def _run(self, points: Iterator[_Keyed]) -> Iterator[tuple[str, Outcome]]:
         call = partial(evaluate_all, whole_periods=self._whole_periods)
-        with self._pool() as pool:
+        far = self._far
+        with threads(self._scene, self._workers) if far is None else nullcontext(far) as pool:
             for task, found in each(pool, call, self._tasks(points)):
                 if isinstance(found, Exception):
                     lost = failed(found)
-                    if self._dask is not None:
+                    if far is not None:
                         # Its workers died again and again, or raised what no scene explains.
                         words = f"The cluster gave it up: {lost.failure}"
                         lost = Outcome({}, words, machine=True)
                     found = [lost] * len(task)
                 yield from zip((key for key, _ in task), found, strict=True)
-
-    def _pool(self) -> AbstractContextManager[Pool]:
-        """New threads for one call of ``run``, or the cluster, which stays connected."""
-        if self._dask is None:
-            return threads(self._scene, self._workers)
-        if self._far is None:
-            self._far = self._stack.enter_context(cluster(self._scene, self._dask))
-        return nullcontext(self._far)
 
     def _tasks(self, points: Iterator[_Keyed]) -> Iterator[list[_Keyed]]:
         """Tasks: consecutive points for the fast solver together, all other points one by one."""

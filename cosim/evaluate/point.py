@@ -49,15 +49,15 @@ def evaluate(
     """
     from cosim.simulation.simulate import summary
 
-    lost = Outcome({})
+    found = Outcome({})
     for _ in range(TRIES):
         try:
             return outcome(summary(point(base, values, whole_periods), progress))
-        except ProcessLost as error:
-            lost = failed(error)
         except CosimError as error:
-            return failed(error)
-    return lost
+            found = failed(error)
+            if not isinstance(error, ProcessLost):
+                break
+    return found
 
 
 def evaluate_all(

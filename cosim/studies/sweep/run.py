@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from cosim.errors import BadInput, Note, plain
-from cosim.evaluate.evaluator import Evaluator
+from cosim.evaluate.evaluator import Evaluator, workers_asked
 from cosim.evaluate.keys import refuse_unknown
 from cosim.evaluate.point import Number, Settings, moved
 from cosim.files.atomic import whole
@@ -24,7 +24,7 @@ from cosim.simulation.checks import motion
 from cosim.studies.sweep import dataset
 from cosim.studies.sweep.design import Design, grid, sample
 from cosim.studies.sweep.report import MOTION, MOTIONS, fastest
-from cosim.toolchain.threads import Progress
+from cosim.toolchain.threads import threads
 from cosim.toolchain.versions import versions
 from cosim.typed import typed
 from cosim.waveforms.columns import UNITS
@@ -166,7 +166,7 @@ def _sweep(
             raise
         if keep:
             points = [n for n in range(total) if not numbers.failures[n]]
-            _keep(family, scene, design, keep, points, bench)
+            _keep(family, scene, design, keep, points, workers)
         return data
 
 
@@ -176,14 +176,13 @@ def _keep(
     design: Design,
     names: Sequence[str],
     points: Sequence[int],
-    bench: Evaluator,
+    workers: int | None,
 ) -> None:
     """Run ``points`` again in threads of this process, and write the waveforms ``names`` of each,
     from ``run.settle`` on, as ``NUMBER.nc``. Raises CosimError."""
     from cosim.simulation.simulate import simulate
 
-    def kept(_: Scene, number: int, progress: Progress) -> None:
-        # The scene that the evaluator passes records no waveforms.
+    def kept(number: int) -> None:
         point = moved(scene, design.point(number), design.changes_frequency)
         result = simulate(point, progress)
         if unknown := [name for name in names if name not in result.columns]:
@@ -194,9 +193,9 @@ def _keep(
         with whole(folder / f"{number}.nc") as temporary, temporary.open("wb") as file:
             netcdf(file, columns, result.units, {"frequency": repr(1.0 / point.period)})
 
-    for _, failed in bench.apply(kept, points):
-        if isinstance(failed, Exception):
-            raise failed
+    with threads(workers_asked(workers)) as (pool, progress):
+        for _ in pool.map(kept, points):  # which raises what a call raises
+            pass
 
 
 def _motions(scene: Scene, design: Design, data: xr.Dataset) -> dict[str, str]:
