@@ -76,13 +76,9 @@ class Evaluator:
     def __exit__(self, *_: object) -> None:
         self._stack.close()
 
-    def known(self, settings: Settings) -> Outcome | None:
-        """The outcome of settings; None where they have not been run, or are to be run again since
-        the machine may have caused their failure."""
-        return outcome_of(self._store.get(hashed(settings)))
-
     def run(self, points: Iterable[tuple[int, Settings]]) -> Iterator[tuple[int, Outcome]]:
-        """The outcome of each point (number, settings), in the order in which they are known."""
+        """The outcome of each point (number, settings), in the order in which they are known. What
+        the store has is not run again, but for failures that the machine may have caused."""
         waiting: dict[str, list[int]] = {}
         """The numbers of the points that wait for a run, by the key of its settings."""
         known: deque[tuple[int, Outcome]] = deque()

@@ -135,17 +135,11 @@ def _sweep(
             for old in family.glob("*.nc"):
                 if old.stem.isdecimal():
                     old.unlink()
-        before: set[int] = set()
-        for number in range(total) if bench.resumed else ():
-            if (outcome := bench.known(design.point(number))) is not None:
-                numbers.add(number, outcome)
-                before.add(number)
-        progress(len(before), numbers.failed, total)
+        progress(0, 0, total)
         due = time.monotonic() + _REFRESH
-        left = design.alike(n for n in range(total) if n not in before)
-        points = ((n, design.point(n)) for n in left)
+        points = ((n, design.point(n)) for n in design.alike(range(total)))
         try:
-            for done, (number, outcome) in enumerate(bench.run(points), len(before) + 1):
+            for done, (number, outcome) in enumerate(bench.run(points), 1):
                 numbers.add(number, outcome)
                 progress(done, numbers.failed, total)
                 if time.monotonic() >= due:
