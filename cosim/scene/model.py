@@ -325,16 +325,12 @@ class Scene(BaseModel):
 
     def _check_reach(self) -> None:
         drive = self.drive
-        if drive.pwm_ripple and not self.rung.firmware:
-            raise fault(
-                'drive.pwm_ripple = true needs circuit.model = "full", which has the filter of '
-                "the offset pin"
-            )
-        if drive.waveform in ("optimal", "quaid", "file") and self.rung.driven:
-            raise fault(
-                f'drive.waveform = "{drive.waveform}" gives the surface its velocity, which needs '
-                'circuit.model = "none"'
-            )
+        if drive.pwm_ripple:
+            why = "drive.pwm_ripple is of the offset pin, which only the whole schematic has"
+            self._need(why, ("circuit.model", ("full",), '"full"'))
+        if drive.waveform not in COMMANDS:
+            why = f'drive.waveform = "{drive.waveform}" gives the surface its velocity'
+            self._need(why, ("circuit.model", ("none",), '"none"'))
         if self.friction.normal_force_file and self.surface_is_given:
             raise fault(
                 f'drive.waveform = "{drive.waveform}" with circuit.model = "none" moves the part '

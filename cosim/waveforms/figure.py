@@ -15,9 +15,8 @@ from cosim.files.picture import Picture, grid, legend_above
 from cosim.files.spill import release
 from cosim.scene import Scene
 from cosim.trials.camera import FRAME_RATE, accelerations, heights
-from cosim.trials.measured import measured
 from cosim.waveforms.quantities import printed, signed
-from cosim.waveforms.report import asked_for
+from cosim.waveforms.report import asked_for, of_the_trial
 
 SURFACE, PART, RAM, DRIVE, EMF = "#1f6fb2", "#d1495b", "#8d99ae", "#2a9d8f", "#e9a03b"
 GRIP, SECOND, STICKING = "#7a5195", "#6fb7e9", "#f4e3c1"
@@ -141,18 +140,15 @@ def _title(scene: Scene, numbers: dict[str, Any]) -> str:
 
 def _measured(scene: Scene) -> str:
     """A line with the measured values of the trial that the scene repeats; else empty."""
-    found = measured(scene)
-    if found is None:
-        return ""
-    number, trial = found
-    low, high = (trial[f"v_surface_{end}"] * 1e3 for end in ("min", "max"))
-    words = [f"part {trial['v_average'] * 1e3:+.2f} mm/s"]
-    if "z_surface_pp" in trial:
-        words.append(f"surface {trial['z_surface_pp'] * 1e3:.2f} mm peak-to-peak")
-    words.append(f"surface {low:+.0f} … {high:+.0f} mm/s")
-    low, high = trial["a_camera_min"], trial["a_camera_max"]
-    words.append(f"read by the camera {low:+.0f} … {high:+.0f} m/s²")
-    return f"measured in trial {number}: {', '.join(words)}"
+    number, known = of_the_trial(scene)
+    forms = {
+        "part's mean velocity": "part {}",
+        "surface, peak-to-peak": "surface {} peak-to-peak",
+        "surface velocity": "surface {}",
+        "as a camera reads it": "read by the camera {}",
+    }
+    words = [form.format(known[name]) for name, form in forms.items() if name in known]
+    return f"measured in trial {number}: {', '.join(words)}" if words else ""
 
 
 def _whole_run(axis: Axes, scene: Scene, waves: dict[str, Array]) -> None:

@@ -47,8 +47,9 @@ def table(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> st
         ("run time", f"{summary['wall_time']:.2f} s for {scene.run.duration:g} s"),
     ]
     rows += _measures(summary)
-    beside = _measured(scene)
-    rows = [(name, value + beside.get(name.strip(), "")) for name, value in rows if value]
+    _, beside = of_the_trial(scene)
+    told = {name: f"   (measured: {words})" for name, words in beside.items()}
+    rows = [(name, value + told.get(name.strip(), "")) for name, value in rows if value]
     return "\n".join(f"  {name:<24}{value}" for name, value in rows)
 
 
@@ -113,19 +114,20 @@ def _measures(summary: dict[str, Any]) -> Iterator[tuple[str, str]]:
             yield name.removeprefix("meas."), "none" if value is None else f"{value:.6g}"
 
 
-def _measured(scene: Scene) -> dict[str, str]:
-    """Measured values of the trial that the scene repeats, by the names of the rows."""
+def of_the_trial(scene: Scene) -> tuple[int, dict[str, str]]:
+    """The number of the trial that the scene repeats, and values measured in it, by the names of
+    the table's rows; none without a trial."""
     found = measured(scene)
     if found is None:
-        return {}
-    _, numbers = found
+        return 0, {}
+    number, numbers = found
     values = {
         "part's mean velocity": _scaled(numbers["v_average"], 1e3, "mm/s", "+.2f"),
         "surface, peak-to-peak": _scaled(numbers.get("z_surface_pp"), 1e3, "mm", ".2f"),
         "surface velocity": _range(numbers, "v_surface", 1e3, "mm/s", "+.0f"),
         "as a camera reads it": _range(numbers, "a_camera", 1, "m/s²", "+.0f"),
     }
-    return {name: f"   (measured: {words})" for name, words in values.items() if words}
+    return number, {name: words for name, words in values.items() if words}
 
 
 def _slips(summary: dict[str, Any]) -> Sequence[tuple[str, str]]:

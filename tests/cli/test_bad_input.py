@@ -49,7 +49,7 @@ FILES = [
     (f"[run]\nduration = 1{'0' * 5000}", "not TOML"),
     ("[drive.frequency]\nx = 1", "drive.frequency = "),
     ("[drive]\nwaveform = 'quad'", 'must be one of "sawtooth", "falling-sawtooth", "sine"'),
-    ("[drive]\nwaveform = 'quaid'", "gives the surface its velocity, which needs circuit.model"),
+    ("[drive]\nwaveform = 'quaid'", "gives the surface its velocity; with it circuit.model"),
     ("[drive]\nfile = 'a.csv'", 'drive.file is for drive.waveform = "file", not for "sawtooth"'),
     ("[drive]\nwaveform = 'sawtoth'", "did you mean sawtooth?"),
     ("[drive]\nwaveform = 3", "drive.waveform = 3 must be one of"),
@@ -87,7 +87,7 @@ FILES = [
     ("[coil]\neddy_resistance = 1", "coil.eddy_resistance needs coil.eddy_inductance"),
     ("[circuit]\nsnubber_resistance = 10", "needs circuit.snubber_capacitance"),
     ("[circuit]\nsnubber_capacitance = 1e-7", "needs circuit.snubber_resistance"),
-    ("[drive]\npwm_ripple = true", 'drive.pwm_ripple = true needs circuit.model = "full"'),
+    ("[drive]\npwm_ripple = true", 'with it circuit.model = "amplifier" must be "full"'),
     ("[drive]\nloop_time = 22e-6", "drive.loop_time = 2.2e-05 s must be 0, or"),
     (
         "[drive]\nwaveform = 'sine'\nloop_time = 22e-6",
