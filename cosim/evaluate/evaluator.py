@@ -3,7 +3,6 @@
 All studies of many runs use it. A point that crashes or hangs does not affect the others.
 """
 
-from collections import deque
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import ExitStack, nullcontext
 from functools import partial
@@ -29,6 +28,10 @@ from cosim.toolchain.threads import processors
 
 TOGETHER = 64
 """Most points in one task of the fast solver, which fills its lanes with runs of like duration."""
+
+AT_ONCE = 128 * TOGETHER
+"""Points that are looked up before the first of them is run. All of these are run before the next
+are looked up, so that few outcomes are in memory, whatever the number of points."""
 
 _Keyed = tuple[str, Settings]
 """The hash of settings, their key in the store, and the settings."""
@@ -79,38 +82,26 @@ class Evaluator:
     def run(self, points: Iterable[tuple[int, Settings]]) -> Iterator[tuple[int, Outcome]]:
         """The outcome of each point (number, settings), in the order in which they are known. What
         the store has is not run again, but for failures that the machine may have caused."""
-        waiting: dict[str, list[int]] = {}
-        """The numbers of the points that wait for a run, by the key of its settings."""
-        known: deque[tuple[int, Outcome]] = deque()
-        stored: dict[str, Any] = {}
-        """Outcomes of the present batch of points: from the store, and of runs that have ended."""
-
-        def new() -> Iterator[_Keyed]:
-            """Settings to be run, each once; points whose outcome is known go into ``known``."""
-            rest = iter(points)
-            while some := list(islice(rest, TOGETHER)):
-                hashes = [hashed(settings) for _, settings in some]
-                stored.clear()
-                stored.update(self._store.some(hashes))
-                for key, (number, settings) in zip(hashes, some, strict=True):
-                    found = outcome_of(stored.get(key))
-                    if found is not None:
-                        known.append((number, found))
-                    elif key in waiting:
-                        waiting[key].append(number)
-                    else:
-                        waiting[key] = [number]
-                        yield key, settings
-
-        for key, outcome in self._run(new()):
-            if self._kept:
-                outcome = outcome.only(self._kept)
-            stored[key] = vars(outcome)
-            self._store.add(key, stored[key])
-            known.extend((number, outcome) for number in waiting.pop(key))
-            while known:
-                yield known.popleft()
-        yield from known
+        rest = iter(points)
+        while some := list(islice(rest, AT_ONCE)):
+            asked: dict[str, Settings] = {}
+            """Settings to be run, each once, by their keys in the store."""
+            numbers: dict[str, list[int]] = {}
+            """The numbers of the points with these settings."""
+            keys = [hashed(settings) for _, settings in some]
+            stored = self._store.some(keys)
+            for key, (number, settings) in zip(keys, some, strict=True):
+                if (known := outcome_of(stored.get(key))) is not None:
+                    yield number, known
+                else:
+                    asked[key] = settings
+                    numbers.setdefault(key, []).append(number)
+            for key, outcome in self._run(asked.items()):
+                if self._kept:
+                    outcome = outcome.only(self._kept)
+                self._store.add(key, vars(outcome))
+                for number in numbers[key]:
+                    yield number, outcome
 
     def forget(self) -> None:
         """The study is done: remove the file."""
@@ -130,7 +121,7 @@ class Evaluator:
             if len(known[n]) == len(groups[n]):
                 yield n, [known[n][k] for k in range(len(groups[n]))]
 
-    def _run(self, points: Iterator[_Keyed]) -> Iterator[tuple[str, Outcome]]:
+    def _run(self, points: Iterable[_Keyed]) -> Iterator[tuple[str, Outcome]]:
         call = partial(evaluate_all, whole_periods=self._whole_periods)
         far = self._far
         with threads(self._scene, self._workers) if far is None else nullcontext(far) as pool:
@@ -144,7 +135,7 @@ class Evaluator:
                     found = [lost] * len(task)
                 yield from zip((key for key, _ in task), found, strict=True)
 
-    def _tasks(self, points: Iterator[_Keyed]) -> Iterator[list[_Keyed]]:
+    def _tasks(self, points: Iterable[_Keyed]) -> Iterator[list[_Keyed]]:
         """Tasks: consecutive points for the fast solver together, all other points one by one."""
         for fast, some in groupby(points, lambda one: is_fast(self._scene, one[1])):
             while task := list(islice(some, TOGETHER if fast else 1)):

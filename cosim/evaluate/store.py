@@ -85,7 +85,7 @@ class Store:
         return self.some([key]).get(key)
 
     def some(self, keys: Sequence[str]) -> dict[str, Any]:
-        """The results under these keys, at most 999, by key."""
+        """The results under these keys, at most 32,766 (SQLite's limit), by key."""
         places = ", ".join("?" * len(keys))
         rows = self._told(
             self._base.execute, f"SELECT key, value FROM found WHERE key IN ({places})", keys
