@@ -76,6 +76,7 @@ class Lines(_Periodic):
         corners = (periods + np.array(self._phases)[places]) / self.frequency
         _, middle, rise = np.array(self._shape)[places[:-1]].T
         start = middle - 0.5 * rise
+        # The first line may have begun before ``begin``.
         corners[0], start[0] = begin, self.piece(begin).value(begin)
         return corners, start, middle + 0.5 * rise
 

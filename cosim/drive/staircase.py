@@ -38,6 +38,7 @@ class Staircase(Command):
         count, edges = len(self.codes), np.array(self._edges)
         most = min(most, ceil((end - begin) * self._rate) + 1)
         period, step = divmod(edge_before(begin, self._rate), count)
+        # Edges are numbered on from period to period; the first one after ``begin`` comes first.
         first = period * len(edges) + bisect_right(self._edges, step)
         periods, places = np.divmod(first + np.arange(most), len(edges))
         corners = (periods * count + edges[places]) / self._rate

@@ -58,6 +58,7 @@ def _lines(command: Command, duration: float) -> Iterator[tuple[Array, Array, Ar
     begin = 0.0
     while begin < duration and (found := command.lines(begin, duration, _TOGETHER)):
         corners, start, end = found
+        # The last straight is cut at ``duration``, before its own end.
         count = int(corners.searchsorted(duration))
         if count < len(corners):
             corners, start, end = corners[: count + 1], start[:count], end[:count]

@@ -27,6 +27,7 @@ MOST_CELLS = 10_000
 _MANY = 10_000  # rows of a table whose reading may take more than a second
 
 _CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029]")
+# Possessive (++, *+), or a long cell that is no number would be tried in all its parts.
 _DIGITS = r"[+-]?(?:[0-9]++{0}?[0-9]*+|{0}[0-9]++)(?:[eE][+-]?[0-9]++)?"  # {0}: decimal sign
 _NUMBER = {sign: re.compile(_DIGITS.format(re.escape(sign))) for sign in ".,"}
 _ASIDE = ("#", "sep=")

@@ -236,11 +236,13 @@ def _signals(units: dict[str, str], runs: list[Run]) -> dict[str, Any]:
 def _head(run: Run) -> dict[str, Any]:
     time, count = run[0], len(run[0])
     step = float(time[-1] - time[0]) / max(1, count - 1)
+    # Rows at even times, as most runs have them, need no times on the page: two ends suffice.
     even = np.abs(time - (time[0] + step * np.arange(count))) <= 1e-6 * step
     # Without a step the page takes the times from the rows, which it reads later.
     ends = {"begin": float(time[0]), "end": float(time[-1])}
     found = ends | {"count": count, "step": step if even.all() else None}
     if count > 4 * BLOCK:
+        # Neighbouring least and greatest values cover the same pixels as all rows between them.
         starts = np.arange(0, count, BUCKET)
         pairs = [(np.fmin.reduceat(x, starts), np.fmax.reduceat(x, starts)) for x in run]
         found["peaks"] = [_coded(np.stack(pair, axis=1)) for pair in pairs]

@@ -107,7 +107,8 @@ class Bench:
             runs = [[settings_at(one) for one in neighbours(point)] for point in points]
             groups = self.outcomes(runs)
             allowed = np.array([self.feasible(machine, group[0]) for group in groups], bool)
-            # points × neighbours × goals, reduced to points × goals.
+            # points × neighbours × goals, reduced to points × goals: a median, since a single turn
+            # may fall out of the motion's mode.
             scores = np.median([[*map(scored, group)] for group in groups], axis=1)
             if self.only is not None:
                 scores[:, np.arange(len(GOALS)) != self.only] = -np.inf

@@ -224,6 +224,7 @@ def observed(method: str, regime: Regime, expected: float) -> float:
     Near a resonance of the mechanics an unstable interval may be narrow: hence the small leaps.
     """
     make = METHODS[method].make
+    # Near the limit a disturbance grows slowly: the run must be long enough to show it.
     # At the shortest step the run lasts _SEEN, but has 600 to _MOST_STEPS steps.
     low, high = 0.8 * expected, min(1.2 * expected, LONGEST)
     steps = int(min(max(600.0, _SEEN / low), _MOST_STEPS))

@@ -158,6 +158,7 @@ def _boundary(axis: Axes, xs: Array, ys: Array, v: Array) -> None:
     low, high = known.min(initial=np.inf), known.max(initial=-np.inf)
     if levels := [level for level in (-STAYS, STAYS) if low < level < high]:
         axis.contour(xs, ys, v, levels=levels, colors="k", linewidths=1.2)
+    # Contours alone would miss islands of a single point, of which maps of knobs have many.
     rows, columns = np.nonzero(np.abs(v) < STAYS)
     axis.plot(xs[columns], ys[rows], "_", color="0.4", ms=9)
 
