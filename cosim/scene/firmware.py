@@ -83,34 +83,30 @@ def offset_pin(offset: float, amplitude: float) -> float:
 
 def staircase(maximum: int, frequency: float) -> tuple[int, ...]:
     """The DAC codes of one period, one each 50 µs, for a commanded ``frequency`` in Hz."""
-    p, q = _share(frequency).as_integer_ratio()  # step k has the code maximum · (1 - k p/q)
-    return tuple(maximum * (q - k * p) // q for k in range(ceil(Fraction(q, p))))
+    share = Fraction(frequency) / STEPS_PER_SECOND  # of a period, that a step takes
+    p, q = share.as_integer_ratio()  # step k has the code maximum · (1 - k p/q)
+    return tuple(maximum * (q - k * p) // q for k in range(_steps(frequency)))
 
 
-def _share(frequency: float) -> Fraction:
-    """The share of a period that one step of 50 µs takes."""
-    return Fraction(frequency) / STEPS_PER_SECOND
+def _steps(frequency: float) -> int:
+    """The number of steps of 50 µs in a period."""
+    return ceil(STEPS_PER_SECOND / Fraction(frequency))
 
 
 def sampled(share: Callable[[float], float], maximum: int, frequency: float) -> tuple[int, ...]:
     """The DAC codes of one period of any shape, as many as :func:`staircase` has: the nearest ones
     to ``share`` (of ``maximum``) at the beginning of each 50 µs step, s."""
-    steps = len(staircase(1, frequency))
-    return tuple(round(maximum * share(k / STEPS_PER_SECOND)) for k in range(steps))
+    times = (k / STEPS_PER_SECOND for k in range(_steps(frequency)))
+    return tuple(round(maximum * share(t)) for t in times)
 
 
 def period(frequency: float, loop_time: float | None) -> float:
     """The period, s, for a commanded ``frequency`` (Hz): of the staircase in steps of 50 µs, or,
     with a ``loop_time`` (s), in passes of the loop."""
-    steps = ceil(1 / _share(frequency))
+    steps = _steps(frequency)
     if not loop_time:
         return steps / STEPS_PER_SECOND
-    each = _passes_a_step(loop_time)
-    return (max(2, each - 1) + (steps - 1) * each + 1) * loop_time  # as ``passes`` lays them out
-
-
-def _passes_a_step(loop_time: float) -> int:
-    return ceil(round(1 / (STEPS_PER_SECOND * loop_time), 9))  # exact quotients stay whole
+    return len(passes((0,) * steps, loop_time)) * loop_time
 
 
 def passes(codes: tuple[int, ...], loop_time: float) -> tuple[int, ...]:
@@ -120,6 +116,6 @@ def passes(codes: tuple[int, ...], loop_time: float) -> tuple[int, ...]:
     maximum is written one pass after the code 0. In the next pass the counter is set to it; the
     first decrement comes later, once a step has passed since the code 0.
     """
-    each = _passes_a_step(loop_time)
+    each = ceil(round(1 / (STEPS_PER_SECOND * loop_time), 9))  # exact quotients stay whole
     falling = (code for code in codes[1:] for _ in range(each))
     return (*(codes[0],) * max(2, each - 1), *falling, 0)

@@ -7,6 +7,7 @@ is CPU time.
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from functools import partial
 from math import nan
 from statistics import median
 from time import process_time
@@ -244,20 +245,16 @@ def measure(case: Case, solvers: Sequence[Solver], rounds: int, store: Store) ->
         judge = reference(f"{case.name}, netlist" if leaky else case.name)
         return outcome.seconds, judge.error(outcome.signals), outcome.steps, ""
 
-    done: list[tuple[float, float, int, str]] = []
-    seconds: list[list[float]] = [[] for _ in plan]
+    taken: list[list[tuple[float, float, int, str]]] = [[] for _ in plan]
     for turn in range(rounds):
-        for k, (solver, value) in enumerate(plan):
+        for (solver, value), known in zip(plan, taken, strict=True):
             # Failed runs, and those that took over 1 s, are not repeated for their time.
-            if turn and (done[k][3] or seconds[k][0] > 1.0):
-                continue
-            name = f"{case.name}, {solver.name}, {value!r}, {turn}"
-            found = store.once(name, lambda solver=solver, value=value: once(solver, value))
-            seconds[k].append(found[0])
-            if not turn:
-                done.append(found)
+            if not known or not (known[0][3] or known[0][0] > 1.0):
+                name = f"{case.name}, {solver.name}, {value!r}, {turn}"
+                known.append(store.once(name, partial(once, solver, value)))
     runs: list[Run] = []
-    for (solver, value), (_, error, steps, failure), spent in zip(plan, done, seconds, strict=True):
+    for (solver, value), known in zip(plan, taken, strict=True):
+        _, error, steps, failure = known[0]
         if not failure:
             before = runs[-1] if runs and runs[-1].method == solver.name else None
             if error > _DIVERGED:
@@ -265,5 +262,5 @@ def measure(case: Case, solvers: Sequence[Solver], rounds: int, store: Store) ->
             elif before is not None and error > _WORSE * before.error:
                 failure = NOT_MONOTONE
         given = (case.name, solver.name, solver.setting, value)
-        runs.append(Run(*given, error, median(spent), steps, failure))
+        runs.append(Run(*given, error, median(seconds for seconds, *_ in known), steps, failure))
     return runs

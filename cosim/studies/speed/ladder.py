@@ -67,7 +67,7 @@ def each_rung(
 
     for model, repeat in RUNS:
         name = f"{own}, {model}, {repeat}"
-        seconds, numbers[model] = store.once(name, lambda model=model: once(model))
+        seconds, numbers[model] = store.once(name, partial(once, model))
         spent[model].append(seconds / runs[model].run.duration)
         progress()
     averages = {model: found["v_average"] for model, found in numbers.items()}

@@ -247,12 +247,13 @@ def limits(regimes: Sequence[Regime], store: Store) -> Iterator[Limit]:
         m, part = regime.machine, "slips" if regime.slips else "sticks"
         given = (m.name, m.strength, regime.output, part, regime.cut)
         for method in METHODS:
+            both = store.once(f"{method}, {given}", partial(_both, method, regime))
+            yield Limit(*given, method, *both)
 
-            def both(method: str = method, regime: Regime = regime) -> list[float]:
-                expected = predicted(method, regime)
-                return [expected, observed(method, regime, expected)]
 
-            yield Limit(*given, method, *store.once(f"{method}, {given}", both))
+def _both(method: str, regime: Regime) -> list[float]:
+    expected = predicted(method, regime)
+    return [expected, observed(method, regime, expected)]
 
 
 @typed
