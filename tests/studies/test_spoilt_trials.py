@@ -132,6 +132,7 @@ TOLD = {
     "mm as m": (HEADER.replace("mm", "m"), same, ["surface [m] times 0.001", "part [m] times"]),
     "µm as mm": (HEADER, scaled(1, 1e3, 1e3), ["surface [mm] times 0.001", "part [mm] times"]),
     "cm as mm": (HEADER, scaled(1, 0.1, 0.1), ["surface [mm] times 10:", "part [mm] times 10:"]),
+    "inches as mm": (HEADER, scaled(1, 1 / 25.4, 1 / 25.4), ["surface [mm] times 25.4: is it in"]),
     "m as mm": (HEADER, scaled(1, 1e-3, 1e-3), ["surface [mm] times 1000", "part [mm] times"]),
     "the part alone in m": (HEADER, scaled(part=1e-3), ["part [mm] times 1000: is it in mm"]),
     "the part alone in cm": (HEADER, scaled(part=0.1), ["column part [mm] times 10: is it in mm"]),
@@ -186,6 +187,22 @@ TOLD = {
     "the surface 4 rows late": (
         *(HEADER, lambda c: [c[0][4:], c[1][:-4], c[2][4:]]),
         ["height of the part would agree", "4 rows later: were both filmed at once?"],
+    ),
+    "a film played backwards": (
+        *(HEADER, lambda c: [c[0], *(z[::-1] for z in c[1:])]),
+        ["hardly explains the recording's velocity of the surface (R² -0.03)", "of the part (R² -"],
+    ),
+    "a mark that does not move": (
+        *(HEADER, lambda c: [c[0], np.random.default_rng(3).normal(0.0, 2e-3, 300), c[2]]),
+        ["hardly explains the recording's velocity of the surface", "what was to be tracked?"],
+    ),
+    "the part's mark lost midway": (
+        *(HEADER, lambda c: [c[0], c[1], np.where(np.arange(300) < 150, c[2], c[2][150])]),
+        ["hardly explains the recording's velocity of the part"],
+    ),
+    "heights smoothed over 15 frames": (
+        *(HEADER, lambda c: [c[0], *(np.convolve(z, np.full(15, 1 / 15), "same") for z in c[1:])]),
+        ["hardly explains the recording's velocity of the surface"],
     ),
     "a column of something else": (
         *(HEADER + ",foo", lambda c: [*c, c[0]]),

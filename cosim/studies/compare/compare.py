@@ -15,6 +15,7 @@ from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.studies.compare.hints import hints
 from cosim.studies.compare.scores import (
+    R2,
     Number,
     Signals,
     both_sides,
@@ -44,6 +45,10 @@ LEAST_ROWS = 8
 
 APART = 0.05
 """Share of a period by which run and recording may drift apart before a note says so."""
+
+
+LITTLE = 0.1
+"""R² below which a note says that the run hardly explains a signal, where no hint tells why."""
 
 
 @dataclass(frozen=True)
@@ -178,7 +183,8 @@ def measure(
         def shown(at: Recording, name: str, first: float) -> Array:
             return Seen(waveforms, at, 0.0).signal(name, first)
 
-        notes += hints(recording, shown, guide, np.concatenate([[start], starts]))
+        told = [*hints(recording, shown, guide, np.concatenate([[start], starts]))]
+        notes += told or _unexplained(recording, simulated)
     numbers = [
         *scores(recording, simulated, repeats),
         *both_sides(recording, simulated, (repeats, period or repeats)),
@@ -193,6 +199,16 @@ def measure(
             "makes, the run's rows against straight lines between the frames."
         )
     return Found(recording, simulated, start, numbers, notes)
+
+
+def _unexplained(recording: Recording, simulated: Signals) -> Iterator[str]:
+    for name in filter(simulated.__contains__, R2):
+        if (share := explained(simulated[name], recording.signals[name])) < LITTLE:
+            yield (
+                f"The run hardly explains the recording's {COLUMNS[name].text} (R² {share:.2g}), "
+                "and no unit, sign or exchange of columns is why: is it of this machine and drive, "
+                "and is what is in this column what was to be tracked?"
+            )
 
 
 def _of_periods(

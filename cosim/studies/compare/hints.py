@@ -1,6 +1,6 @@
 """Hints at errors in a recording's file. They are printed, never applied.
 
-Each guess is one change of the file: a power of ten, a sign, exchanged columns, a velocity in the
+Each guess is one change of the file: a power of ten, inches, a sign, exchanged columns, a velocity in the
 place of a height, a part measured from the surface or at another time, a wrong frame rate. A guess
 becomes a hint if it at least halves the variance that the run does not explain.
 """
@@ -17,8 +17,9 @@ from cosim.trials.camera import velocities
 from cosim.trials.recording import Recording
 from cosim.waveforms.columns import COLUMNS
 
-# Of a column: powers of ten, and both signs.
-FACTORS = np.array([sign * 10.0**power for power in range(-6, 7) for sign in (1, -1)])
+# Of a column: powers of ten, millimetres in an inch, and both signs.
+SIZES = (*(10.0**power for power in range(-6, 7)), 25.4)
+FACTORS = np.array([sign * size for size in SIZES for sign in (1, -1)])
 UNCHANGED = int(np.flatnonzero(FACTORS == 1.0)[0])
 CLOCKS = np.linspace(0.988, 1.012, 25)
 """Factors of the recording's times."""
@@ -119,6 +120,8 @@ def _of_other_motion(
             yield f"{hint} as a velocity, in {headers[z]['unit']}/s: is it one?"
             return
     if not {"z_surface", "v_surface", "z_part", "v_part"} <= signals.keys():
+        return
+    if explained(laid[0], signals[guide]) < WELL:  # then the start, and so a delay, is by chance
         return
     row, part = float(np.median(np.diff(recording.time))), signals["v_part"]
     lifted = "with the surface's height added to it: is it measured from the surface?"
