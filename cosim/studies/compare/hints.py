@@ -1,8 +1,8 @@
 """Hints at errors in a recording's file. They are printed, never applied.
 
-Each guess is one change of the file: a power of ten, inches, a sign, exchanged columns, a velocity in the
-place of a height, a part measured from the surface or at another time, a wrong frame rate. A guess
-becomes a hint if it at least halves the variance that the run does not explain.
+Each guess is one change of the file: a power of ten, inches, a sign, exchanged columns, a velocity
+in the place of a height, a part measured from the surface or at another time, a wrong frame rate. A
+guess becomes a hint if it at least halves the variance that the run does not explain.
 """
 
 from collections.abc import Callable, Iterator
