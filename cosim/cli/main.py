@@ -106,7 +106,7 @@ _COMPLETION = Command(
     "completion",
     "print the script by which a shell completes commands, options, scenes and files",
     _completion,
-    [Option("shell", "whose start-up file evaluates it", choices=("bash", "zsh"))],
+    [Option("shell", "the shell for which to print it", choices=("bash", "zsh"))],
 )
 
 

@@ -348,14 +348,14 @@ COMMANDS = (
             OVERRIDES,
             Option(
                 "--spread",
-                "also tell how rugged the answer is: v_average with each of the three knobs turned "
+                "also tell the spread of the answer: v_average with each of the three knobs turned "
                 "by 2 % either way",
                 kind=bool,
             ),
             Option(
                 "--error",
-                "tell how far v_average is off by two finer runs, and what it is from three more "
-                "starts; about ten times the time",
+                "estimate the error of v_average from two finer runs, and tell v_average of three "
+                "more starts; takes about ten times as long",
                 kind=bool,
                 parameter="strict",
             ),
@@ -373,7 +373,7 @@ COMMANDS = (
         "scenes",
         "list the built-in scenes, or what is in one",
         _scenes,
-        [Option("scene", "tell what of it is not as by default", "SCENE", many="optional")],
+        [Option("scene", "show its keys that differ from the defaults", "SCENE", many="optional")],
     ),
     Command(
         "show",

@@ -162,13 +162,13 @@ class Drive(Table):
 
     waveform: _Waveform = _choice(
         "sawtooth",
-        "Shape of the command; of the surface's velocity for optimal, quaid and file. That of "
-        "table are steps, whose levels are held, or pieces, straight lines from one to the next",
+        "Shape of the command; of the surface's velocity for optimal, quaid and file. steps holds "
+        "the levels of table, pieces joins them by straight lines",
     )
     table: _Table | None = _choice(
         None,
-        "Shape of steps and pieces: 1 to 64 pairs of phase, 0 to 1, and level, -0.5 to 0.5, that "
-        "of the offset being 0; two of one phase make a jump",
+        "Shape of steps and pieces: 1 to 64 pairs of phase, 0 to 1, and level, -0.5 to 0.5 about "
+        "the offset; two pairs of one phase make a jump",
         words="a list of 1 to 64 pairs of numbers, [[phase, level], ...]",
     )
     duty: float = _number(0.5, "1", 0.0, 1.0, "Share of the period that the square wave is high")
@@ -203,7 +203,7 @@ class Drive(Table):
     )
     quantised: bool = _choice(
         False,
-        "Firmware's staircase of 10-bit codes every 50 us: 15 to 40 times the time in full",
+        "Firmware's staircase of 10-bit codes every 50 us; full then takes 15 to 40 times as long",
     )
     loop_time: float = _number(
         0.0, "s", 0.0, 1e-3, "Pass of the firmware's loop, about 22 us; 0 makes steps of 50 us"
@@ -327,11 +327,11 @@ class Circuit(Table):
     slew_rate: float = _number(10e6, "V/s", 1e2, 1e12, "Slew rate of the power amplifier")
     swing_loss_high: float = _number(
         *(4.0, "V", 0.0, 1e3),
-        "Supply less highest output; the data sheet's, which full takes, is 2.6 V at 1.3 A",
+        "Supply minus highest output; full takes the data sheet's, 2.6 V at 1.3 A",
     )
     swing_loss_low: float = _number(
         *(4.0, "V", 0.0, 1e3),
-        "Lowest output less negative supply; the data sheet's, which full takes, is 1.7 V at 1.3 A",
+        "Lowest output minus negative supply; full takes the data sheet's, 1.7 V at 1.3 A",
     )
     output_resistance: float = _number(
         0.0, "Ohm", 0.0, 1e3, "Open-loop output resistance of the power amplifier"

@@ -126,7 +126,7 @@ def scene() -> str:
         "All numbers are in SI units. Another value for one run: "
         "`cosim run SCENE --set table.key=value`.",
         "A key that has no effect with the scene's `circuit.model`, `drive.waveform` or "
-        "`coupling.method` is told as a note, but not where ports join a circuit to FMUs. A value "
+        "`coupling.method` causes a note, except where ports join a circuit to FMUs. A value "
         "out of range is refused before anything runs.",
     ]
     for name, model in TABLES.items():
@@ -241,13 +241,13 @@ def command_line() -> str:
     parser = _parser(None)
     about = (
         "`python -m cosim` is the same command. `--help` after any of these prints its options. "
-        "[The glossary](../glossary.md) has the words."
+        "[The glossary](../glossary.md) explains the terms."
     )
     codes = table(
         ["exit code", "meaning"],
         [
             ["0", "done"],
-            ["2", "bad input, told in one sentence on stderr; nothing was written"],
+            ["2", "bad input; one sentence on stderr says what is wrong; nothing was written"],
             ["3", "the simulation failed; the sentence says where, when, and what to try"],
             ["130", "interrupted; what was complete is kept"],
         ],

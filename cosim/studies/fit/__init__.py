@@ -22,8 +22,8 @@ MU_K = (
     "kinetic friction, by which normal forces follow from µ_k F_n, or “free” to find it from the "
     "bounds of the forces (default: 0.59, as measured)"
 )
-NO_PLATE = "no friction at the spring-loaded plate, which else moves as tracked and rubs"
-EVALUATE = "take the paper's parameters, by its procedure, instead of a fit"
+NO_PLATE = "leave out the friction of the spring-loaded plate, which by default moves as tracked"
+EVALUATE = "evaluate the paper's parameters by its procedure instead of a fit"
 SOLVER = "of the paper's parameters: exact, or the authors' fixed-step scheme"
 
 STUDIES = (

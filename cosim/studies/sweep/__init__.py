@@ -4,7 +4,7 @@ from cosim.studies.study import DASK, OVERRIDES, SCENE, SHOW, WORKERS, Option, S
 
 OVER = Option(
     "--over",
-    "a numeric key and its values; repeatable, the last one runs fastest. Where the frequency is "
+    "a numeric key and its values; repeatable, the last one varies fastest. Where the frequency is "
     "swept, each point lasts whole periods",
     "TABLE.KEY=START:STOP:N|A,B,C",
     many="repeat",

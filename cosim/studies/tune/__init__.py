@@ -17,10 +17,10 @@ STUDIES = (
         "find the settings that transport best",
         (
             *(SCENE, OVERRIDES),
-            Option("--maximise", "a number of the summary: v_average, …", "NAME"),
-            Option("--minimise", "the same, downwards; one of the two is needed", "NAME"),
+            Option("--maximise", "a number of the summary to make large: v_average, …", "NAME"),
+            Option("--minimise", "a number to make small; one of the two is needed", "NAME"),
             OVER,
-            Option("--budget", "settings run in all, of each waveform", "N", int, 200),
+            Option("--budget", "number of settings to run, for each waveform", "N", int, 200),
             Option(
                 "--waveform",
                 "search each of these by itself, with the numbers of its shape: sawtooth, "
@@ -31,13 +31,15 @@ STUDIES = (
             Option("--polarity", "search both polarities of the coil", kind=bool),
             Option(
                 "--robust",
-                "the median over all turns of the keys by 2 %, 15 runs a setting of three knobs",
+                "search by the median over all turns of the keys by 2 % (by the worst where signs "
+                "differ): 15 runs a setting of three knobs",
                 kind=bool,
             ),
             Option(
                 "--heat",
-                "most of a coil, W, or the winding's rise in cycles (default: 3.5 W, the most that "
-                "the drives of the Carlton's data sheet make)",
+                "largest heat of a coil, W, or largest rise of the winding's temperature, K, with "
+                "the share of on-time and the time on, s (default: 3.5 W, the most that the drives "
+                "of the Carlton's data sheet make)",
                 "W|K:DUTY:SECONDS",
             ),
             *(SEED, WORKERS, DASK),
