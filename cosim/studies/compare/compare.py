@@ -14,15 +14,8 @@ from scipy.optimize import minimize_scalar
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.studies.compare.hints import hints
-from cosim.studies.compare.scores import (
-    R2,
-    Number,
-    Signals,
-    both_sides,
-    explained,
-    mean_distance,
-    scores,
-)
+from cosim.studies.compare.scores import R2, Number, Signals, both_sides, explained, scores
+from cosim.studies.report import Row
 from cosim.trials.camera import heights, velocities
 from cosim.trials.periods import period_of
 from cosim.trials.recording import Recording
@@ -64,6 +57,16 @@ class Found:
     start: float
     numbers: list[Number]
     notes: list[str]
+
+    @property
+    def rows(self) -> list[Row]:
+        """A row for each value of each number: name, value, unit and meaning."""
+        return [row for number in self.numbers for row in number.rows()]
+
+    @property
+    def values(self) -> dict[str, float | None]:
+        """The values by the names of ``rows``."""
+        return {row["name"]: row["value"] for row in self.rows}
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,27 +110,6 @@ class Seen:
         around = starts[max(best - 1, 0)], starts[min(best + 1, SHIFTS - 1)]
         finer = minimize_scalar(missed, bounds=around, method="bounded", options={"xatol": 1e-6})
         return min((float(starts[best]), float(finer.x)), key=missed)
-
-    def camera_errors(self, start: float) -> list[Number]:
-        """Mean distances between the run's rows and linear interpolation of the recording's frames,
-        as scripts that interpolate a trial see it."""
-        found, time, signals = [], self.waveforms["time"], self.recording.signals
-        for signal, name, unit, scale, words in (
-            ("z_surface", "camera_surface_mm", "mm", 1e3, "height of the surface"),
-            ("z_part", "camera_part_mm", "mm", 1e3, "height of the part"),
-            ("v_surface", "camera_velocity", "m/s", 1.0, "velocity of the surface"),
-        ):
-            if signal not in signals:
-                continue
-            known = np.isfinite(signals.get("v_surface", self.recording.time))
-            # Where the velocity is known, since a trial's first and last frames have none.
-            frames = (self.recording.time + start)[known]
-            shown = (time >= frames[0] - 1e-9) & (time <= frames[-1] + 1e-9)
-            drawn = np.interp(time[shown], frames, signals[signal][known])
-            value = scale * mean_distance(self.waveforms[signal][shown], drawn)
-            meaning = f"mean error of the {words} that the camera alone makes"
-            found.append(Number(name, value, unit, meaning))
-        return found
 
 
 def measure(
@@ -185,18 +167,18 @@ def measure(
 
         told = [*hints(recording, shown, guide, np.concatenate([[start], starts]))]
         notes += told or _unexplained(recording, simulated)
+    rate = "rows of the recording in a second, the median"
+    first = "time of the run that is laid over the recording's first row"
     numbers = [
         *scores(recording, simulated, repeats),
         *both_sides(recording, simulated, (repeats, period or repeats)),
-        Number("rate", 1.0 / row, "1/s", "rows of the recording in a second, the median"),
-        Number("start", start, "s", "time of the run that is laid over the recording's first row"),
+        Number("rate", "1/s", rate, {"value": 1.0 / row}),
+        Number("start", "s", first, {"value": start}),
     ]
     if own:
-        numbers += seen.camera_errors(start)
         notes.append(
             "This trial is the run's own. Both sides went through the same camera: mean_error_mm "
-            "is what the digits of the file make, and camera_… is the error that the camera alone "
-            "makes, the run's rows against straight lines between the frames."
+            "is what the digits of the file make."
         )
     return Found(recording, simulated, start, numbers, notes)
 

@@ -46,7 +46,7 @@ def draw(title: str, found: Found) -> Picture:
 
 def _message(found: Found) -> str:
     """In words, the first R² of the comparison and the error of the part's mean velocity."""
-    numbers = {number.name: number.value for number in found.numbers}
+    numbers = found.values
     said = [
         f"explains {_share(share)} of the variance of the {words}"
         for name, words in R2.values()
@@ -91,7 +91,7 @@ BOTH = {
 
 def _words(name: str, found: Found) -> str:
     """A panel's title: the score of its signal, and the number that both sides have."""
-    numbers = {number.name: number.value for number in found.numbers}
+    numbers = found.values
     said = []
     if name in WORDS:
         score, words, beside = WORDS[name]

@@ -1,8 +1,8 @@
 """The command and library function that compare a run with a recording."""
 
 import os
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,7 @@ from cosim.simulation.rungs.given_surface import surface
 from cosim.simulation.simulate import simulate
 from cosim.studies.compare import figure
 from cosim.studies.compare.compare import Found, measure
-from cosim.studies.compare.scores import LINES, Number
+from cosim.studies.compare.scores import LINES, SIDES, Number
 from cosim.studies.report import Row, markdown
 from cosim.studies.report import write_csv as write_rows
 from cosim.trials.recording import Recording, read_recording
@@ -41,7 +41,7 @@ class Comparison:
     def numbers(self) -> dict[str, float | None]:
         """All numbers by name; SI but for ``_mm`` and ``_percent``. A score's bare name is that of
         the run; with ``_ceiling``, ``_no_motion``, ``_straight_line`` it is a reference's."""
-        return {number.name: number.value for number in self.found.numbers}
+        return self.found.values
 
     def plot(self) -> Picture:
         """Every measured signal and the simulated one, over time."""
@@ -54,7 +54,7 @@ class Comparison:
         about = {"understood": self.found.recording.understood, "notes": self.found.notes}
         content = {"run": self.run, "trial": self.trial, **self.numbers, **about}
         write_json(out / "compare.json", content)
-        write_rows(out / "compare.csv", [asdict(number) for number in self.found.numbers])
+        write_rows(out / "compare.csv", self.found.rows)
         recording, simulated = self.found.recording, self.found.simulated
         table, units = {"time": recording.time}, {"time": "s"}
         for side, signals in (("measured", recording.signals), ("simulated", simulated)):
@@ -64,22 +64,16 @@ class Comparison:
         self.plot().write(out / "compare.png")
 
     def __repr__(self) -> str:
-        numbers = {number.name: number for number in self.found.numbers}
-        scores, pairs, alone = (_table(numbers, ends) for ends in TABLES)
+        scores, pairs, alone = (
+            _table([number for number in self.found.numbers if [*number.values] == [*columns]])
+            for columns in (LINES, SIDES, ("value",))
+        )
         parts = self.found.recording.told(), scores, LEGEND, pairs, alone, self.found.notes
         return "\n\n".join("\n".join(lines) for lines in parts if lines)
 
 
 FEWEST_ROWS = 2.1
 """Fewest rows of a recording in a period of the run: a little above the two of Nyquist's limit."""
-
-TABLES = (
-    {end: end.replace("_", " ").strip() or "run" for end in LINES},
-    {"_measured": "measured", "_simulated": "simulated"},
-    {"": "value"},
-)
-"""For each printed table: its columns' heads, by the ends of the names of their numbers. The last
-table takes all numbers that are left."""
 
 LEGEND = (
     "ceiling: the measured motion's forecast of itself one period later",
@@ -88,19 +82,14 @@ LEGEND = (
 )
 
 
-def _table(numbers: dict[str, Number], ends: Mapping[str, str]) -> list[str]:
-    """A table with a row for each name that ``numbers`` has with all ``ends``, in the units of the
-    bench, and the meanings of the rows. Removes these numbers from ``numbers``."""
+def _table(numbers: Sequence[Number]) -> list[str]:
+    """A table with a row for each number, in the units of the bench, and their meanings."""
     rows: list[Row] = []
-    meanings: list[str] = []
-    first = next(iter(ends))
-    for name in [each.removesuffix(first) for each in numbers if each.endswith(first)]:
-        if all(name + end in numbers for end in ends):
-            found = [numbers.pop(name + end) for end in ends]
-            unit, scale = bench_unit(found[0].unit)
-            values = [number.value and number.value * scale for number in found]
-            rows.append({"": f"{name} [{unit}]", **dict(zip(ends.values(), values, strict=True))})
-            meanings.append(f"{name}: {found[0].meaning}")
+    for number in numbers:
+        unit, scale = bench_unit(number.unit)
+        values = {of: value and value * scale for of, value in number.values.items()}
+        rows.append({"": f"{number.name} [{unit}]", **values})
+    meanings = [f"{number.name}: {number.meaning}" for number in numbers]
     return [*markdown(rows), "", *meanings] if rows else []
 
 

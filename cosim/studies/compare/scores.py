@@ -1,13 +1,14 @@
 """The numbers of a comparison: scores beside those of references without a model, and numbers that
 are measured and simulated alike, such as drift and kick."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import isfinite, nan
 
 import numpy as np
 
 from cosim.arrays import Array
+from cosim.studies.report import Row
 from cosim.trials.camera import FRAME_RATE
 from cosim.trials.periods import drift, one_period_later, whole_periods
 from cosim.trials.recording import Recording
@@ -16,26 +17,38 @@ STICKS = 0.01
 """m/s; part and surface that differ by less between frames count as sticking, on both sides."""
 
 LINES = {
-    "": "",
-    "_ceiling": "; of the measured motion's forecast of itself one period later",
-    "_no_motion": "; of nothing that moves",
-    "_straight_line": "; of the best straight line",
+    "run": "",
+    "ceiling": "; of the measured motion's forecast of itself one period later",
+    "no motion": "; of nothing that moves",
+    "straight line": "; of the best straight line",
 }
-"""The run and the references for which a score is given: what each adds to the score's name and to
-its meaning. No model need beat the ceiling; the last two are floors."""
+"""The run and the references for which a score is given, and what each adds to its meaning. No
+model need beat the ceiling; the last two are floors."""
+SIDES = "measured", "simulated"
 
 Signals = dict[str, Array]
+Values = dict[str, float | None]
 Distance = Callable[[Array, Array], float]
 
 
 @dataclass(frozen=True)
 class Number:
-    """One number of a comparison, with its unit and meaning; None where it is not known."""
+    """A number of a comparison by the columns of its table, which are LINES, SIDES, or one "value"
+    alone; None where it is not known."""
 
     name: str
-    value: float | None
     unit: str
     meaning: str
+    values: Values
+
+    def rows(self) -> list[Row]:
+        """A row for each value; its name has the column's behind it, if that is not the run's."""
+        ends = ["" if of in ("run", "value") else f"_{of.replace(' ', '_')}" for of in self.values]
+        return [
+            {"name": self.name + end, "value": value, "unit": self.unit}
+            | {"meaning": self.meaning + LINES.get(of, "")}
+            for end, (of, value) in zip(ends, self.values.items(), strict=True)
+        ]
 
 
 def explained(found: Array, wanted: Array) -> float:
@@ -73,18 +86,15 @@ def scores(recording: Recording, simulated: Signals, period: float | None) -> li
     """The scores of all signals, each for all ``LINES``; ``period`` is the measured one, s."""
     found, time = [], recording.time
 
-    def lines(measured: Array, run: Array, gained: float, score: Distance) -> list[float | None]:
-        # In the order of LINES. The forecast is the measured signal a period before plus its drift
-        # ``gained`` in one; None where the motion does not repeat.
+    def lines(measured: Array, run: Array, gained: float, score: Distance) -> Values:
+        # The forecast is the measured signal a period before plus its drift ``gained`` in one; None
+        # where the motion does not repeat.
         known = np.isfinite(measured)
         line = np.polynomial.Polynomial.fit(time[known], measured[known], 1)
         later = one_period_later(time, measured, period, gained) if period else None
         predictions = run, later, np.zeros(len(time)), line(time)
-        return [None if x is None else _known(score(x, measured)) for x in predictions]
-
-    def add(name: str, unit: str, meaning: str, values: list[float | None]) -> None:
-        for (end, words), value in zip(LINES.items(), values, strict=True):
-            found.append(Number(f"{name}{end}", value, unit, f"{meaning}{words}"))
+        scored = (None if x is None else _known(score(x, measured)) for x in predictions)
+        return dict(zip(LINES, scored, strict=True))
 
     if "z_part" in simulated:
         measured, run = (side["z_part"] for side in (recording.signals, simulated))
@@ -101,11 +111,12 @@ def scores(recording: Recording, simulated: Signals, period: float | None) -> li
             ("centred_error_mm", "mm", 1e3, centred_distance, centred),
         ):
             values = lines(measured, run, gained, distance)
-            add(name, unit, words, [value and value * scale for value in values])
+            values = {of: value and value * scale for of, value in values.items()}
+            found.append(Number(name, unit, words, values))
     for signal, (name, words) in R2.items():
         if signal in simulated:
             values = lines(recording.signals[signal], simulated[signal], 0.0, explained)
-            add(name, "1", SHARE.format(words), values)
+            found.append(Number(name, "1", SHARE.format(words), values))
     return found
 
 
@@ -119,11 +130,10 @@ def both_sides(
 ) -> list[Number]:
     """Numbers of the measured and of the simulated signals; ``periods`` are those of both, s."""
     time, found = recording.time, []
-    sides = (("measured", recording.signals), ("simulated", simulated))
+    sides = recording.signals, simulated
 
-    def pair(name: str, unit: str, meaning: str, values: list[float | None]) -> None:
-        for (side, _), value in zip(sides, values, strict=True):
-            found.append(Number(f"{name}_{side}", value, unit, meaning))
+    def pair(name: str, unit: str, meaning: str, values: Sequence[float | None]) -> None:
+        found.append(Number(name, unit, meaning, dict(zip(SIDES, values, strict=True))))
 
     frequencies = [1.0 / period if period else None for period in periods]
     pair("frequency", "Hz", "how often the motion repeats", frequencies)
@@ -133,26 +143,25 @@ def both_sides(
         words = f"over {each} whole periods" if all(counts) else "from end to end"
         drifts = [
             drift(time, signals["z_part"], period if all(counts) else None)
-            for (_, signals), period in zip(sides, periods, strict=True)
+            for signals, period in zip(sides, periods, strict=True)
         ]
-        pair("drift", "m/s", f"mean velocity of the part, {words}", [*drifts])
-        error = drifts[1] - drifts[0]
-        found.append(Number("drift_error", error, "m/s", "drift simulated less measured"))
+        pair("drift", "m/s", f"mean velocity of the part, {words}", drifts)
+        error, words = drifts[1] - drifts[0], "drift simulated less measured"
+        found.append(Number("drift_error", "m/s", words, {"value": error}))
     if {"v_surface", "v_part"} <= set(simulated):
-        shares = [_slipping(signals) for _, signals in sides]
         words = "share of the rows in which part and surface differ by more than 10 mm/s"
-        pair("slip_fraction", "1", words, [*shares])
+        pair("slip_fraction", "1", words, [_slipping(signals) for signals in sides])
     if "v_surface" in simulated:
         # Changes are taken over one frame of the trials' camera, since a change between two rows
         # would depend on the recording's rate.
         apart = max(1, round(1.0 / FRAME_RATE / float(np.median(np.diff(time)))))
         apart = min(apart, len(time) // 2)
-        velocities = [signals["v_surface"] for _, signals in sides]
+        velocities = [signals["v_surface"] for signals in sides]
         changes = [np.abs(v[apart:] - v[:-apart]) for v in velocities]
         # fmax ignores NaN; where all are NaN, −inf remains, which becomes None.
         kicks = [_known(float(np.fmax.reduce(each, initial=-np.inf))) for each in changes]
         words = f"largest change of the surface's velocity in {time[apart] * 1e3:.3g} ms"
-        pair("kick", "m/s", f"{words}: what impacts show", [*kicks])
+        pair("kick", "m/s", f"{words}: what impacts show", kicks)
     return found
 
 
