@@ -6,7 +6,6 @@ scene's analysis and ``reltol`` replace the netlist's; its other options stay. A
 is treated alike; ``circuits/README.md`` says what it must have.
 """
 
-from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -68,18 +67,20 @@ def prepare(scene: Scene) -> Deck:
     The run goes to ``run.duration`` with steps of at most ``circuit.max_step``. Raises BadInput,
     beginning with the netlist's file and line, for what is wrong with it or might do harm.
     """
-    path, words = path_of(scene), _words(scene)
-    if scene.circuit.netlist is None:
+    path, words, circuit, renamed = path_of(scene), _words(scene), scene.circuit, scene.renamed
+    # The sources that ports join to the machine, if any do.
+    sources = [renamed[end] for end in ("machine.back_emf", "drive") if renamed]
+    if circuit.netlist is None:
         netlist = _packaged(path)
     else:  # read anew each time, as the file may have changed
-        asked = (*words.values(), *(scene.circuit.save or ()))
-        netlist = _checked(path, scene.renamed, asked, scene.circuit.save or ())
+        kept, required = circuit.save or (), None if renamed else AGREED
+        netlist = checked(path, sources, (*words.values(), *kept), required, "v", saved=kept)
         words |= {f"{OWN}{each}": each for each in netlist.words}
     title, elements = netlist.title, netlist.top.elements
     present = {node for element in elements for node in element.nodes}
     names = {element.name for element in elements}
     agreed = next((each for each in AGREED if names.issuperset(each)), ())
-    fed = {name.lower() for name in _joined_sources(scene.renamed)} or {*agreed}
+    fed = {name.lower() for name in sources} or {*agreed}
     external = {
         each.line: " ".join([each.name, *each.nodes, "external"])
         for each in elements
@@ -87,11 +88,11 @@ def prepare(scene: Scene) -> Deck:
     }
     companion = scene.coupling.method == "companion"
     if companion:
-        emf = scene.renamed.get("machine.back_emf", "vemf").lower()
+        emf = renamed.get("machine.back_emf", "vemf").lower()
         _carry_inertia(external, title, present, emf)
     for node in ("out", "sense"):
         if f"v({node})" not in words and node not in present:
-            port = f', or a [[port]] to "machine.{node}"' if scene.renamed else ""
+            port = f', or a [[port]] to "machine.{node}"' if renamed else ""
             refuse(title, f"the netlist must have a node {node}, one of the coil's two ends{port}")
     saved = {name: name for name in REQUIRED}
     saved |= {f"v({name})": f"v({name})" for name in OPTIONAL if agreed and name in present}
@@ -99,7 +100,6 @@ def prepare(scene: Scene) -> Deck:
         saved[MOTIONAL] = MOTIONAL
     vectors = dict(zip(netlist.words, reading(netlist.words), strict=True))
     saved |= {name: vectors[word][0] for name, word in words.items()}
-    circuit = scene.circuit
     values = parameters(scene) | own_parameters(netlist.top, str(path), circuit.param or {})
     steps = scene.run.duration, circuit.reltol, circuit.max_step
     return netlist.deck(external, values, saved, *steps)
@@ -111,22 +111,10 @@ def _words(scene: Scene) -> dict[str, str]:
     return {ends[end]: name for end, name in scene.renamed.items() if end in ends}
 
 
-def _checked(
-    path: Path, renamed: Mapping[str, str], words: Sequence[str], saved: Collection[str] = ()
-) -> Checked:
-    required = None if renamed else AGREED
-    return checked(path, _joined_sources(renamed), words, required, "v", saved=saved)
-
-
 @cache
 def _packaged(path: Path) -> Checked:
     """A netlist of the package, read once a process; a run's step sets its edges, not its own."""
-    return replace(_checked(path, {}, ()), dropped=())
-
-
-def _joined_sources(renamed: Mapping[str, str]) -> list[str]:
-    """The netlist's sources that ports join to the machine, if any do."""
-    return [renamed[end] for end in ("machine.back_emf", "drive") if renamed]
+    return replace(checked(path, (), (), AGREED, "v"), dropped=())
 
 
 def _carry_inertia(external: dict[Line, str], title: Line, present: set[str], emf: str) -> None:
