@@ -166,7 +166,7 @@ class Checked:
         edges = self._edges(external, max_step, duration)
         text = [self.title.text]
         for line, element, holder in self.top.order:
-            if holder is self.top and line in external:
+            if line in external:
                 text.append(external[line])
             elif all(each.used for each in holder.chain()):  # something calls the subcircuit
                 free = (f" {key}=0" for key in sorted(holder.free) if line is holder.line)
@@ -321,6 +321,5 @@ def _pulses(top: Scope, external: Collection[Line]) -> Iterator[str]:
     """ngspice's names of the sources with PULSE, such as ``v.x1.x2.v3``, but the external ones."""
     for part in Expansion(top).parts(top, {}):
         path, element = part.path, part.element
-        replaced = not path and element.line in external
-        if element.kind in "vi" and "pulse" in element.words and not replaced:
+        if element.kind in "vi" and "pulse" in element.words and element.line not in external:
             yield f"{element.kind}.{path}{element.name}" if path else element.name

@@ -21,6 +21,9 @@ class Line:
     """The first of its lines in the file; 0 for text from elsewhere."""
     bad: str = ""
     """The reason not to use it, or the model of which ``text`` then has the name alone."""
+    scope: tuple[int, ...] = ()
+    """Places in the netlist of the .subckt lines that enclose it, the outermost first; a .subckt
+    line lies in its own scope."""
 
     @property
     def place(self) -> str:

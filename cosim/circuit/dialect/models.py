@@ -2,7 +2,7 @@
 programs as behavioural sources, and initial currents."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 from typing import Any
@@ -31,17 +31,16 @@ def in_ngspice_together(lines: Sequence[Line]) -> list[Line]:
     """Translates what spans several lines: models derived from another (``ako:``), switches and
     diodes of other programs as B sources, and currents of inductors in ``.ic``. Where a model only
     approximates the original, a line ``.told`` says so to the user. Raises BadInput."""
-    scopes, lines = [*_scopes(lines)], [*lines]
-    _complete(lines, scopes)
+    lines = [*lines]
+    _complete(lines)
     known: dict[_Key, str] = {}
-    firsts = (line.text.split(None, 1)[0].lower() for line in lines)
-    elements = {*zip(scopes, firsts, strict=True)}
-    for place, (line, scope) in enumerate(zip(lines, scopes, strict=True)):
+    elements = {(line.scope, line.text.split(None, 1)[0].lower()) for line in lines}
+    for place, line in enumerate(lines):
         text = line.text.lower()
         if match := _SWITCHING.match(text):
             try:
                 law, told = _law(line, match[2])
-                key = scope, _DEVICES[match[2]], match[1]
+                key = line.scope, _DEVICES[match[2]], match[1]
                 if known.setdefault(key, law) != law:
                     known[key] = ""
                     refuse(
@@ -53,24 +52,24 @@ def in_ngspice_together(lines: Sequence[Line]) -> list[Line]:
                 lines[place] = unusable(line, error, f".model {words(line.text)[1]}")
         elif text.startswith(".ic"):
             for name, current in _CURRENT.findall(text):
-                if (scope, name) not in elements:
+                if (line.scope, name) not in elements:
                     refuse(line, f"there is no inductor {shown(name)} here")
-                known[scope, name] = current
+                known[line.scope, name] = current
             lines[place] = replace(line, text=_CURRENT.sub("", line.text).strip())
-    apart = (_apart(*each, known) for each in zip(lines, scopes, strict=True))
-    return [line for line in chain(*apart) if line.text.lower() not in ("", ".ic")]
+    apart = chain.from_iterable(_apart(line, known) for line in lines)
+    return [line for line in apart if line.text.lower() not in ("", ".ic")]
 
 
-def _apart(line: Line, scope: tuple[int, ...], known: Mapping[_Key, str]) -> list[Line]:
+def _apart(line: Line, known: Mapping[_Key, str]) -> list[Line]:
     """The lines of an element: a switch or diode as a B source by its model's law, an inductor with
     the initial current that ``known`` has for it, any other as it is."""
     name, *rest = words(line.text) if line.text[:1].lower() in {*"swdl"} else [""]
     count = {"s": 4, "w": 3}.get(name[:1], 2)
-    law = _nearest(known, scope, name[:1], rest[count]) if len(rest) > count else None
+    law = _nearest(known, line.scope, name[:1], rest[count]) if len(rest) > count else None
     texts, (plus, minus, *control) = [line.text], rest[:count] if law else ["", ""]
-    if (scope, name) in known and len(rest) > 2:
+    if (line.scope, name) in known and len(rest) > 2:
         # At the operating point a source of 1 GV per ampere of error holds the current, later 0 V.
-        error = f"1e9*(i(v{name}_ic)-({known[scope, name]}))"
+        error = f"1e9*(i(v{name}_ic)-({known[line.scope, name]}))"
         texts = [
             " ".join([name, rest[0], f"{name}_ic", *rest[2:]]),
             f"v{name}_ic {name}_ic {name}_at 0",
@@ -92,18 +91,18 @@ def _nearest(known: Mapping[_Key, Any], scope: tuple[int, ...], *key: str) -> An
     return next((known[each] for each in about if each in known), None)
 
 
-def _complete(lines: list[Line], scopes: Sequence[tuple[int, ...]]) -> None:
+def _complete(lines: list[Line]) -> None:
     """Write out each model derived by ``ako:`` with the parameters that it inherits."""
     own: dict[_Key, int] = {}  # places of models; -1 where a scope has two of the same name
-    for place, (line, scope) in enumerate(zip(lines, scopes, strict=True)):
+    for place, line in enumerate(lines):
         if MODEL.match(line.text):
-            key = scope, words(line.text)[1]
+            key = line.scope, words(line.text)[1]
             own[key] = -1 if key in own else place
 
     def complete(place: int, seen: tuple[int, ...] = (-1,)) -> None:
         if (match := _AKO.match(lines[place].text)) is None:
             return
-        base = _nearest(own, scopes[place], match[1].lower())
+        base = _nearest(own, lines[place].scope, match[1].lower())
         if base is None or base in (place, *seen):
             refuse(lines[place], f"no model {shown(match[1])} is defined here{COPY}")
         complete(base, (place, *seen))
@@ -121,18 +120,6 @@ def _complete(lines: list[Line], scopes: Sequence[tuple[int, ...]]) -> None:
             complete(place)
         except BadInput as error:
             lines[place] = unusable(line, error, f".model {words(line.text)[1]}")
-
-
-def _scopes(lines: Sequence[Line]) -> Iterator[tuple[int, ...]]:
-    """For each line the places of the .subckt lines that enclose it, the outermost first."""
-    scope: tuple[int, ...] = ()
-    for place, line in enumerate(lines):
-        word = line.text.split(None, 1)[0].lower()
-        if word == ".subckt":
-            scope = (*scope, place)
-        elif word == ".ends":
-            scope = scope[:-1]
-        yield scope
 
 
 def _law(line: Line, kind: str) -> tuple[str, str]:

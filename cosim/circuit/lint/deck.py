@@ -101,8 +101,8 @@ class _Reader:
     dropped: list[Line] = field(default_factory=list)
     bytes_read: int = 0
     includes: int = 0
-    depth: int = 0
-    """How many subcircuits enclose the line."""
+    scope: tuple[int, ...] = ()
+    """That of the lines at hand."""
 
     def deck(self) -> list[Line]:
         name = shown(self.path.name)
@@ -172,21 +172,19 @@ class _Reader:
             if word in _INLINED:
                 self._inline(line, rest, opened)
             elif word == ".end" and opened[1:]:  # libraries end subcircuits by it
-                if self.depth > 0:
-                    self.depth -= 1
-                    self._add(self.lines, replace(line, text=".ends"))
+                if self.scope:
+                    self._keep(replace(line, text=".ends"), ".ends")
             elif word == ".end":
                 for after in lines:
                     refuse(after, "there is text after .end, which must come last")
                 return True
-            elif library and not word and self.depth < 1:
+            elif library and not word and not self.scope:
                 if not outside:
                     told = ".told parts outside subcircuits have no effect in a .lib, as in LTspice"
                     self._add(self.dropped, replace(line, text=f"{told}; .include takes them"))
                 outside = True
             elif kept := self._passed(line, opened[-1]):
-                self.depth = max(0, self.depth + (word == ".subckt") - (word == ".ends"))
-                self._add(self.lines, kept)
+                self._keep(kept, word)
             else:
                 self._add(self.dropped, line)
         return found
@@ -197,9 +195,17 @@ class _Reader:
             text = passed(self._with_points(line, base))
             return None if text is None else replace(line, text=text)
         except BadInput as error:
-            if self.depth < 1 or directive(line)[0] in (".subckt", ".ends"):
+            if not self.scope or directive(line)[0] in (".subckt", ".ends"):
                 raise
             return unusable(line, error, ".unknown")
+
+    def _keep(self, line: Line, word: str) -> None:
+        """Take a line for ngspice, which begins with the directive ``word``."""
+        if word == ".subckt":
+            self.scope = (*self.scope, len(self.lines))
+        elif word == ".ends":
+            self.scope = self.scope[:-1]
+        self._add(self.lines, replace(line, scope=self.scope))
 
     def _add(self, lines: list[Line], line: Line) -> None:
         if len(lines) >= MAX_LINES:
