@@ -7,7 +7,6 @@ import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import islice
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -23,11 +22,8 @@ from cosim.scene.model import Scene, toml_value
 from cosim.scene.rungs import METHODS
 from cosim.scene.tables import (
     KNOBS,
-    LEVEL_KEY,
     NORMAL_FORCES,
-    PARAM_KEY,
     PATHS,
-    PORT_LISTS,
     TABLES,
 )
 
@@ -132,7 +128,10 @@ def _layers(source: str) -> list[_Layer]:
         words = "this file says nothing, so each key has its default"
         warnings.warn(f"{origin}: {words}; cosim new writes one to begin with.", Note, stacklevel=3)
     data.setdefault("name", name or "scene")
-    _check_names(data, origin)
+    for table in TABLES.keys() & data.keys():
+        if not isinstance(data[table], dict):
+            given = messages.shown(data[table])
+            raise BadInput(f"{origin}: {table} = {given} must be a table.")
     own = [circuits() / "ports", *compiled_fmus()] if source in builtin else []
     _find_files(data, path.parent, *own)
     base = data.pop("base", None)
@@ -230,47 +229,6 @@ def _read(source: str, origin: str, builtin: list[str]) -> dict[str, Any]:
         raise messages.bad(f'there is no built-in scene and no file "{origin}"{hint}') from None
 
 
-def _check_names(data: dict[str, Any], origin: str) -> None:
-    told = [*map(messages.ended, islice(_unknown(data, origin), messages.MOST_TOLD))]
-    if told:
-        told[1:] = [sentence[:1].upper() + sentence[1:] for sentence in told[1:]]
-        raise BadInput(f"{origin}: {' '.join(told)}")
-
-
-def _unknown(data: dict[str, Any], origin: str) -> Iterator[str]:
-    """A sentence, "there is no …", on each table and key that is not known."""
-    for name, content in data.items():
-        if name in ("name", "description", "base"):
-            continue
-        if name in PORT_LISTS:
-            yield from _unknown_in_list(name, content, origin)
-            continue
-        if name not in TABLES:
-            yield messages.unknown_table(name)
-            continue
-        if not isinstance(content, dict):
-            raise BadInput(f"{origin}: {name} = {messages.shown(content)} must be a table.")
-        known = TABLES[name].model_fields
-        for key in content:
-            single = {"drive": LEVEL_KEY, "circuit": PARAM_KEY}.get(name)
-            if key not in known and not (single and single.fullmatch(key)):
-                yield messages.unknown_key(name, key)
-
-
-def _unknown_in_list(name: str, content: Any, origin: str) -> Iterator[str]:
-    """A sentence on each key of ``[[fmu]]`` or ``[[port]]`` that is not known. An override has
-    parameters of FMUs instead, ``{"name.parameter": value}``, which pass."""
-    if name == "fmu" and isinstance(content, dict) and all("." in key for key in content):
-        return
-    if not (isinstance(content, list) and all(isinstance(each, dict) for each in content)):
-        hint = "; a parameter is fmu.name.parameter" if name == "fmu" else ""
-        raise BadInput(f"{origin}: {name} must be a list of tables, [[{name}]]{hint}.")
-    known = [field.alias or key for key, field in PORT_LISTS[name].model_fields.items()]
-    for key in (key for each in content for key in each if key not in known):
-        hint = messages.suggestion(key, known) or f" (keys: {', '.join(known)})"
-        yield f'there is no key "{plain(key)}" in [[{name}]]{hint}'
-
-
 def _parsed(overrides: Iterable[str]) -> Iterator[tuple[str, Any]]:
     """The keys and values of ``table.key=value`` options."""
     for text in overrides:
@@ -305,11 +263,9 @@ def _tables(values: Iterable[tuple[str, Any]], origin: str) -> dict[str, Any]:
         if not isinstance(full, str):
             raise BadInput(f"{origin}: {messages.shown(full)} must be a text, table.key.")
         table, dot, key = full.partition(".")
-        if full not in KEYS:
-            if not dot:
-                hint = messages.full_name(full)
-                raise messages.bad(f"{origin}: {plain(full)} must be table.key{hint}")
-            _check_names({table: {key: None}}, origin)
+        if not dot:
+            hint = messages.full_name(full)
+            raise messages.bad(f"{origin}: {plain(full)} must be table.key{hint}")
         if isinstance(value, os.PathLike):
             value = os.fspath(value)
         # numpy's numbers are no Python numbers
@@ -329,7 +285,8 @@ def _find_files(tables: dict[str, Any], folder: Path, *more: Path) -> None:
         path = tables.get(table, {}).get(key)
         if isinstance(path, str):
             tables[table][key] = found(path)
-    for fmu in tables.get("fmu", ()):
+    fmus = tables.get("fmu")
+    for fmu in fmus if isinstance(fmus, list) else ():
         if isinstance(fmu, dict) and isinstance(fmu.get("file"), str):
             fmu["file"] = found(fmu["file"])
 
@@ -390,7 +347,10 @@ def _with_parameters(
     found = [fmu | {"parameters": {**fmu.get("parameters", {})}} for fmu in fmus]
     by_name = {fmu["name"]: fmu for fmu in found}
     for key, value in given.items():
-        name, _, parameter = key.partition(".")
+        name, dot, parameter = key.partition(".")
+        if not dot:
+            words = "fmu must be a list of tables, [[fmu]]; a parameter is fmu.name.parameter"
+            raise BadInput(f"{origin}: {words}.")
         if name not in by_name:
             known = ", ".join(map(str, by_name)) or "none"
             raise BadInput(f"{origin}: fmu.{plain(key)}: there is no such FMU (known: {known}).")

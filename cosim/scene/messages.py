@@ -1,8 +1,8 @@
 """One sentence for everything that can be wrong with a scene."""
 
 import difflib
+import re
 from collections.abc import Iterable, Mapping
-from itertools import islice
 from math import inf
 from numbers import Integral
 from operator import attrgetter
@@ -135,9 +135,12 @@ def explain(error: ValidationError, origins: Mapping[str, tuple[int, str]], defa
     for each in error.errors(include_url=False):
         origin, sentence = _explained(each, origins, default)
         told.setdefault(sentence.partition(" = ")[0], (origin, ended(sentence)))  # once for a list
+        if len(told) == MOST_TOLD:
+            break
     said, last = "", None
-    for origin, sentence in islice(told.values(), MOST_TOLD):
-        said += f" {sentence}" if origin == last else f" {origin}: {sentence}"
+    for origin, sentence in told.values():
+        follows = re.sub("^there is", "There is", sentence)
+        said += f" {follows}" if origin == last else f" {origin}: {sentence}"
         last = origin
     return said.strip()
 
@@ -150,6 +153,9 @@ def _explained(first: Any, origins: Mapping[str, tuple[int, str]], default: str)
     if first["loc"][0] in PORT_LISTS:
         return origins.get(first["loc"][0], (0, default))[1], _of_list(first)
     full = ".".join(str(part) for part in first["loc"][:2])  # not the place in a list
+    if first["type"] == "extra_forbidden":
+        unknown = unknown_key if len(first["loc"]) > 1 else unknown_table
+        return origins.get(full, (0, default))[1], unknown(*first["loc"])
     if full == "circuit.param" and len(first["loc"]) > 2:
         name = f"{full}.{first['loc'][2]}"
         origin = origins.get(name, origins.get(full, (0, default)))[1]
@@ -165,8 +171,14 @@ def _of_list(fault: Any) -> str:
     """A sentence on a key of ``[[fmu]]`` or ``[[port]]``."""
     table, *place = fault["loc"]
     if len(place) < 2:
+        if fault["type"] != "too_long":
+            return f"{table} must be a list of tables, [[{table}]]"
         return f"[[{table}]] is given too often"
     fields = PORT_LISTS[table].model_fields
+    if fault["type"] == "extra_forbidden":
+        known = [each.alias or name for name, each in fields.items()]
+        hint = suggestion(place[1], known) or f" (keys: {', '.join(known)})"
+        return f'there is no key "{plain(place[1])}" in [[{table}]]{hint}'
     key = next(name for name, each in fields.items() if place[1] in (name, each.alias))
     allowed = described(table, key).allowed
     what = f"[[{table}]] {place[0] + 1}: {place[1]}"
