@@ -54,7 +54,7 @@ def opened(scene: str, overrides: Iterable[str] = ()) -> tuple[str, dict[str, di
             "drive from time 0 on, and no [[port]], own file, DAC steps, PWM ripple or "
             "drive.phase_deg."
         )
-    link, known = to_link(found), rigs.turned()
+    link, known = to_link(found), rigs.TURNED
     for key in (pair.partition("=")[0] for pair in link.split("&")[1:]):
         if key not in known and not key.startswith(("run.", "coupling.")):
             raise found.bad(f"the page cannot turn {plain(key)}.")

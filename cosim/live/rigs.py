@@ -14,22 +14,21 @@ _MACHINE = Path(__file__).with_name("web") / "machine.json"
 MODEL = "limited"
 """The circuit of the page: the one that is inside the FMU."""
 
-_TURNED = {
+_OTHERS = {
     "drive": {"waveform", "table", "duty", "reset_time", "start_phase", *KNOBS, *KNOBS.values()},
     "circuit": {"model", "supply", "swing_loss_high", "swing_loss_low"},
     "coil": {"polarity"},
 }
 """Keys that the page changes besides those that are variables of the FMU."""
+
+TURNED = {
+    full: key
+    for full, key in KEYS.items()
+    if (key.variable and key.name != "tolerance") or key.name in _OTHERS.get(key.table, ())
+}
+"""The keys that the page changes, by their full names."""
+
 _CHOICES = {"drive.waveform": COMMANDS, "circuit.model": (MODEL,)}
-
-
-def turned() -> dict[str, Key]:
-    """The keys that the page changes, by their full names."""
-    return {
-        full: key
-        for full, key in KEYS.items()
-        if (key.variable and key.name != "tolerance") or key.name in _TURNED.get(key.table, ())
-    }
 
 
 def scenes() -> dict[str, Scene]:
@@ -48,14 +47,14 @@ def fits(scene: Scene) -> bool:
 
 def _scene(scene: Scene) -> dict[str, Any]:
     """A scene for the page: the keys that differ from their defaults, and what follows from it."""
-    own = {full: getattr(getattr(scene, key.table), key.name) for full, key in turned().items()}
+    own = {full: getattr(getattr(scene, key.table), key.name) for full, key in TURNED.items()}
     for knob, key in KNOBS.items():
         if own[f"drive.{knob}"] is not None:
             own[f"drive.{key}"] = None
-    values = {full: v for full, v in own.items() if v not in (None, turned()[full].default)}
+    values = {full: v for full, v in own.items() if v not in (None, TURNED[full].default)}
     values.pop("circuit.model", None)
     _, integers = parameters(load(scene, {"circuit.model": MODEL}))
-    variables = {key.variable for key in turned().values()}
+    variables = {key.variable for key in TURNED.values()}
     return {
         "text": scene.description,
         "model": scene.circuit.model,
@@ -91,7 +90,7 @@ def data() -> dict[str, Any]:
     """All the page's data, as JSON can hold it."""
     return {
         "scenes": {name: _scene(scene) for name, scene in scenes().items()},
-        "keys": {full: _key(key) for full, key in turned().items()},
+        "keys": {full: _key(key) for full, key in TURNED.items()},
         "knobs": knobs(),
         "references": json.loads(_MACHINE.read_text(encoding="utf-8"))["references"],
         "longest": LONGEST,
