@@ -81,7 +81,7 @@ def without_effect(dropped: Sequence[Line]) -> Iterator[str]:
     for line in dropped:
         text = line.text.lower()
         word, match = text.split()[0], _MEAS.match(text)
-        without = re.search(r"\b(uic|startup)\b", text) if word == ".tran" else None
+        without = re.search(r"\b(uic|startup|skipbp)\b", text) if word == ".tran" else None
         if word == ".told":
             yield f"{line.place}: {line.text[6:]}."
         elif word in _SAVING:

@@ -618,13 +618,14 @@ def test_what_has_no_effect_is_told(tmp_path: Path) -> None:
 .ac dec 1 1 2
 .meas ac x MAX V(in)
 .tran 1u 1m uic
+.tran 1u 1m SKIPBP
 .step param k list 1 2
 .options plotwinsize=0 MaxStep=1u
 .backanno
 .tran 1m
 """
     notes = summary_of(tmp_path, f"{HEAD}{lines}")["notes"]
-    assert [note.split(" ")[0] for note in notes[:-1]] == [f"own.cir:{n}:" for n in range(10, 19)]
+    assert [note.split(" ")[0] for note in notes[:-1]] == [f"own.cir:{n}:" for n in range(10, 20)]
     assert notes[-1] == "ngspice knows no odd of a model, and ignored it."
 
 
