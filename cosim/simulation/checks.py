@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.errors import BadInput, CosimError
+from cosim.errors import BadInput, CosimError, plain
 from cosim.mechanics.fmi import load
 from cosim.mechanics.normal_force import normal_force
 from cosim.scene import KEYS, Scene, changed
@@ -126,21 +126,22 @@ def checked(
     least = LEAST_TOLD if scene.rung.ngspice and not strict else 0.0
     error = _errors(own, told, ["v_average"], least).get("v_average")
     if scene.rung.own_netlist and error is not None and 2.0 * error > WRONG * scale:
-        found["notes"] = [*own["notes"], _too_long(scene, error)]
+        words = f"v_average by {2e3 * error:.2g} mm/s, more than a fifth of it"
+        found["notes"] = [*own["notes"], _too_long(scene, words)]
     return replace(result, summary=own | {"v_average_error": error, **found})
 
 
-def _too_long(scene: Scene, error: float) -> str:
-    """A note on an ``error`` (m/s) of the user's netlist by its steps."""
-    shorter = _longer(scene, 1.0 / COARSER).circuit
-    tried = (
-        f"circuit.{name} = {max(getattr(shorter, name), KEYS[f'circuit.{name}'].low):.1g}"
-        for name in ("reltol", "max_step")
-    )
+def _too_long(scene: Scene, moved: str, method: str = "") -> str:
+    """A note on what the steps of the user's netlist may have ``moved``, and by how much; with the
+    ``method`` "macro-steps" these steps, too."""
+    shorter = _longer(scene, 1.0 / COARSER)
+    keys = ["circuit.reltol", "circuit.max_step"]
+    keys += ["coupling.macro_step"] * (method == "macro-steps")
+    values = (getattr(getattr(shorter, KEYS[key].table), KEYS[key].name) for key in keys)
+    tried = (f"{key} = {max(x, KEYS[key].low):.1g}" for key, x in zip(keys, values, strict=True))
     return (
-        f"the steps of ngspice may move v_average by {2e3 * error:.2g} mm/s, more than a fifth of "
-        f"it: either they are too long for this netlist (try {' and '.join(tried)}), or the motion "
-        "is chaotic."
+        f"the steps of ngspice may move {moved}: either they are too long for this netlist (try "
+        f"{' and '.join(tried)}), or the motion is chaotic."
     )
 
 
@@ -158,7 +159,14 @@ def checked_ports(scene: Scene, run: Callable[[], Result], progress: Progress) -
         scales = {f"{name}.mean": max(own[f"{name}.rms"], ROUNDED) for name in named}
         told = _judges(scene, own, other.result(), scales, progress)
     errors = _errors(own, told, (name for name in own if name.endswith(".mean")), LEAST_TOLD)
-    return replace(result, summary=own | {f"{name}_error": errors[name] for name in errors})
+    found: dict[str, Any] = {f"{name}_error": errors[name] for name in errors}
+    worst = max(scales, key=lambda name: errors.get(name, 0.0) / scales[name], default="")
+    if errors.get(worst, 0.0) > FAR * scales.get(worst, 0.0):
+        name = worst.removesuffix(".mean")
+        by = f"{2.0 * errors[worst]:.2g} {result.units[name]}"
+        words = f"the mean of {plain(name)} by {by}, more than a tenth of its rms"
+        found["notes"] = [*own["notes"], _too_long(scene, words, own["method"])]
+    return replace(result, summary=own | found)
 
 
 def _judges(

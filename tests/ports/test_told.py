@@ -36,6 +36,7 @@ def test_edges_that_two_runs_meet_alike_do_not_hide_the_error() -> None:
         assert abs(found[name] - true[name]) > 1e-4 * abs(true[name])
         assert within_twice_the_told(found[name], found[f"{name}_error"], true[name])
         assert found[f"{name}_error"] < 20.0 * abs(found[name] - true[name])
+    assert not any("may move" in note for note in found["notes"])
 
 
 def test_a_comparator_that_longer_steps_pass_over_does_not_hide_the_error(tmp_path: Path) -> None:
@@ -54,6 +55,8 @@ def test_a_comparator_that_longer_steps_pass_over_does_not_hide_the_error(tmp_pa
         assert off > 0.2 * abs(true.summary[name])
         assert within_twice_the_told(found[name], told, true.summary[name])
         assert told < 20.0 * off
+    (note,) = (each for each in found["notes"] if "may move the mean of" in each)
+    assert "more than a tenth of its rms" in note and "circuit.max_step = 6e-06)" in note
 
 
 BRIDGE = """* bridge
