@@ -136,11 +136,6 @@ class Lead(ngspice.Leader):
         """Steps that ngspice accepted."""
         return max(0, len(self._log) - 1)
 
-    @property
-    def ngspice(self) -> str:
-        """Version of ngspice."""
-        return str(engine().ngspice_version)
-
     def log(self) -> dict[str, npt.NDArray[np.float64]]:
         """LOG and the saved vectors (A, V) at the accepted points."""
         return dict(zip((*LOG, *self._saved), self._log.array().T, strict=True))

@@ -63,7 +63,7 @@ def joined(
         "fmu_steps": sum(side.fmu.steps for side in run.plan.sides),
         "wall_time": time.perf_counter() - began,
         "method": run.plan.method,
-        "versions": {**versions(), **run.versions},
+        "versions": versions() | {"ngspice": str(engine().ngspice_version)},
         "notes": [*run.deck.notes, *run.plan.notes, *_notes(run, odd), *without],
     }
     return columns, summary, units

@@ -162,11 +162,6 @@ class Run(ngspice.Leader):
         """Steps that ngspice accepted."""
         return max(0, len(self.log) - 1)
 
-    @property
-    def versions(self) -> dict[str, str]:
-        """Version of ngspice."""
-        return {"ngspice": str(engine().ngspice_version)}
-
     def _refuse_what_is_no_number(self) -> None:
         """Raise SimulationFailed for an output that is not finite: ngspice stops at it, too, but
         would only report its own steps."""

@@ -43,7 +43,7 @@ def drive(scene: Scene, recorder: Recorder) -> Driven:
         method=scene.coupling.method,
         circuit_steps=lead.steps,
         circuit_rejected=lead.state.attempts - lead.steps,
-        versions={"ngspice": lead.ngspice},
+        versions={"ngspice": str(engine().ngspice_version)},
         measured=values,
         notes=notes,
         waves=lambda: waves,
