@@ -343,7 +343,7 @@ def test_the_scenes_own_setting_is_run_too() -> None:
             ["--heat", "60:2"],
             "--heat 60:2: a limit of heat needs a rise above 0 K, a duty from 0 to 1",
         ),
-        (["--heat", "60:0.3:1:1"], "RISE:DUTY:SECONDS"),
+        (["--heat", "60:0.3:1:1"], "K:DUTY:SECONDS"),
         (["--heat", "warm"], "--heat warm: must be a number above 0 W"),
     ],
 )

@@ -187,7 +187,7 @@ def family(name: str) -> tuple[dict[str, Any], dict[str, tuple[float, float]]]:
 
 
 def most_heat(scene: Scene, limit: float | str | None) -> float:
-    """The limit of the heat in a coil, W, from a number in W, "RISE:DUTY" or "RISE:DUTY:SECONDS"
+    """The limit of the heat in a coil, W, from a number in W, "K:DUTY" or "K:DUTY:SECONDS"
     (K, 1, s). None means that of the Carlton's range of drives in a scene with such an actuator,
     else no limit. Raises BadInput."""
     if limit is None:
@@ -201,8 +201,8 @@ def most_heat(scene: Scene, limit: float | str | None) -> float:
         found = float("nan")
     if not found > 0.0:
         raise BadInput(
-            f"--heat {plain(limit)}: must be a number above 0 W, or RISE:DUTY or "
-            f"RISE:DUTY:SECONDS with a rise in K (without a time: {LIFT:g} s)."
+            f"--heat {plain(limit)}: must be a number above 0 W, or K:DUTY or "
+            f"K:DUTY:SECONDS, a rise in K (without a time: {LIFT:g} s)."
         )
     return found
 
