@@ -56,6 +56,7 @@ def test_run_is_what_the_command_writes(result: cosim.Result, tmp_path: Path) ->
         mine, theirs = ((tmp_path / who / name).read_bytes() for who in ("library", "command"))
         assert mine == theirs, name
     summary = json.loads((tmp_path / "command" / "summary.json").read_text(encoding="utf-8"))
+    assert len(summary.pop("run")) == 16
     assert summary | {"wall_time": 0.0} == result.summary | {"wall_time": 0.0}
 
 
@@ -64,7 +65,7 @@ def test_waveforms_have_units_and_names(result: cosim.Result, tmp_path: Path) ->
     waves = result.waveforms
     result.save(tmp_path)
     stored = xr.load_dataset(tmp_path / "waveforms.nc")
-    assert stored.identical(waves)
+    assert len(stored.attrs.pop("run")) == 16 and stored.identical(waves)
     with netCDF4.Dataset(tmp_path / "waveforms.nc") as file:
         assert file["v_part"].units == "m/s" and file["v_part"].long_name == "velocity of the part"
     heads = (tmp_path / "waveforms.csv").read_text(encoding="utf-8").partition("\n")[0].split(",")

@@ -21,10 +21,10 @@ class Picture(Figure):
         super().__init__(figsize=(width, height), dpi=110, layout=layout)
         self._agg = FigureCanvasAgg(self)  # savefig would draw twice
 
-    def write(self, path: Path) -> None:
-        """Write the figure as a PNG, whole or not at all. Raises BadInput."""
+    def write(self, path: Path, texts: dict[str, str] | None = None) -> None:
+        """Write the figure as a PNG with ``texts``, whole or not at all. Raises BadInput."""
         with whole(path) as temporary:
-            self._agg.print_png(temporary)
+            self._agg.print_png(temporary, metadata=texts)
 
     def png(self) -> bytes:
         """The figure as a PNG."""

@@ -13,6 +13,7 @@ from cosim.arrays import Array
 from cosim.files.atomic import as_json, together
 from cosim.scene import Scene, to_toml
 from cosim.typed import typed
+from cosim.waveforms import identity
 from cosim.waveforms.columns import UNITS, about
 from cosim.waveforms.report import table
 from cosim.waveforms.storage import csv, netcdf
@@ -21,9 +22,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from cosim.files.picture import Picture
-
-
-FILES = ("waveforms.csv", "waveforms.nc", "scene.toml", "summary.json", "figure.png")
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,20 +63,22 @@ class Result:
         """Write what ``cosim run`` writes: ``waveforms.csv``, ``waveforms.nc``, ``scene.toml``,
         ``summary.json`` and ``figure.png``, each whole or not at all.
 
-        Files of an older run go, all of them, when those of this one but the figure are written.
+        Older files are replaced only when all but the figure are written. Each other file contains
+        the hash of ``waveforms.csv``, by which :mod:`cosim.waveforms.identity` finds strangers.
         Raises BadInput where the folder cannot be written to.
         """
-        *data, figure = (Path(folder) / name for name in FILES)
-        # A kill must not leave files of an older run beside those of this one: hence all go first.
-        with together(data, outdated=[*data, figure]) as (table, waveforms, scene, summary):
+        *data, figure = (Path(folder) / name for name in identity.FILES)
+        # A kill must not leave the figure of an older run beside the numbers of this one.
+        with together(data, outdated=[figure]) as (table, waveforms, scene, summary):
             with open(table, "wb") as file:
                 csv(file, self.columns, self.units)
-            about = self._attributes() | {"scene": to_toml(self.scene, folder=folder)}
+            run = identity.of_table(table)
+            about = self._attributes() | {"scene": to_toml(self.scene, folder=folder), "run": run}
             with open(waveforms, "wb") as file:
                 netcdf(file, self.columns, self.units, about)
             scene.write_text(about["scene"], encoding="utf-8")
-            summary.write_text(as_json(self.summary), encoding="utf-8")
-        self.plot().write(figure)
+            summary.write_text(as_json({"run": run, **self.summary}), encoding="utf-8")
+        self.plot().write(figure, identity.in_figure(run))
 
     def _attributes(self) -> dict[str, str]:
         return {"title": self.scene.description or self.scene.name, "scene": to_toml(self.scene)}

@@ -110,6 +110,7 @@ def test_matlab(run: Path, tmp_path: Path) -> None:
         [netCDF4.Dataset(run / "waveforms.nc").title],
         [(run / "scene.toml").read_text(encoding="utf-8")],
     )
+    assert len(made.pop("run")[0]) == 16
     struct_ = made.pop("units")
     assert {name: str(struct_[name][0, 0][0]) for name in struct_.dtype.names} == units(run)
     assert all(values.shape == (len(made["time"]), 1) for values in made.values())

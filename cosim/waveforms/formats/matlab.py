@@ -14,8 +14,8 @@ ABOUT = 116  # bytes of free text at the file's beginning
 
 def write(run: Run, file: BytesIO) -> str:
     """A column vector for each column, under its own name and in SI (_ replaces characters that
-    MATLAB's names cannot have); a struct ``units`` with the unit of each; ``title``, and ``scene``
-    (the text of scene.toml)."""
+    MATLAB's names cannot have); a struct ``units`` with the unit of each; ``title``, ``scene`` (the
+    text of scene.toml) and ``run``."""
     from scipy.io import savemat
 
     names = legal(run.waveforms, {"units", *run.attributes})

@@ -9,6 +9,7 @@ from pathlib import Path
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.scene import Scene, load
+from cosim.waveforms.identity import tell_strangers
 from cosim.waveforms.storage import read_netcdf
 
 
@@ -20,7 +21,7 @@ class Run:
     waveforms: dict[str, Array]
     units: dict[str, str]
     attributes: dict[str, str]
-    """``title`` and ``scene`` (text of scene.toml)."""
+    """``title``, ``scene`` (text of scene.toml), and ``run`` (the run's name, if known)."""
     written: datetime
 
     @property
@@ -53,7 +54,10 @@ def read(folder: Path) -> Run:
     if not path.exists():
         raise BadInput(f"{name}: there is no run in this folder (waveforms.nc is missing).")
     waveforms, units, attributes = read_netcdf(path)
-    about = {name: attributes.get(name, "") for name in ("title", "scene")}
+    tell_strangers(folder, attributes)
+    about = {"title": "", "scene": ""} | {
+        name: text for name, text in attributes.items() if name in ("title", "scene", "run")
+    }
     written = datetime.fromtimestamp(path.stat().st_mtime, UTC)
     return Run(folder, waveforms, units, about, written)
 
