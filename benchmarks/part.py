@@ -77,4 +77,4 @@ def _made_up(number: int) -> Trial:
     waves, time = simulate(scene).columns, frame_times(0.4 + 0.003 * number, FRAMES)
     seen = (heights(waves, body, time, 0.0) for body in ("surface", "part"))
     surface, moved = (Track(z, velocities(time, z)) for z in seen)
-    return Trial(f"made up {number}", None, time - time[0], surface, moved, None)
+    return Trial(f"made up {number}", time - time[0], surface, moved, None)

@@ -31,10 +31,9 @@ class Track:
 
 @dataclass(frozen=True)
 class Trial:
-    """One tracked trial; ``number`` is the last whole number in its file's name."""
+    """One tracked trial."""
 
     name: str
-    number: int | None
     time: Array  # s
     platform: Track
     part: Track
@@ -101,7 +100,7 @@ def read(path: Path) -> Trial:
         warnings.warn(f"{plain(path)}: {sentence}", Note, stacklevel=2)
     platform, part = track(columns, "surface"), track(columns, "part")
     plate = track(columns, "plate") if "z_plate" in columns else None
-    return Trial(path.stem, number_of(path), columns["time"], platform, part, plate)
+    return Trial(path.stem, columns["time"], platform, part, plate)
 
 
 def read_platform(path: Path) -> tuple[Array, Track]:

@@ -206,7 +206,7 @@ def test_the_path_of_a_slide_is_the_exact_one() -> None:
         ends = np.array([time[0]]), np.array([time[-1]])
         span = Span(-1, np.arange(16), np.arange(16), *ends)
         nothing = Track(z, np.gradient(z, time))
-        trial = Trial("any", 1, time, nothing, nothing, None)
+        trial = Trial("any", time, nothing, nothing, None)
         found = slide(trial, span, 2e-6, 1e5)
         assert found is not None
         near = kinetic * np.array([1.0, 0.99, 1.01])

@@ -9,7 +9,7 @@ import pytest
 from cosim.errors import BadInput
 from cosim.files.cells import LARGEST
 from cosim.trials.table import read_table
-from cosim.trials.tracked import read, read_folder
+from cosim.trials.tracked import number_of, read, read_folder
 
 HEADER: str = "t,xp,zp,vxp,vzp,axp,azp,xo,zo,vxo,vzo,axo,azo,xs,zs,vxs,vzs,axs,azs"
 GONE = "\ufffd"
@@ -58,7 +58,7 @@ def test_a_published_trial(tmp_path: Path):
     path = write(tmp_path / "Trial #7.csv", text(table()))
     check(path)
     trial = read(path)
-    assert (trial.name, trial.number) == ("Trial #7", 7)
+    assert trial.name == "Trial #7" and number_of(path) == 7
     assert trial.plate is not None
     accelerations = read_table(path).columns["a_surface"]
     assert np.isnan(accelerations[[0, 1, -2, -1]]).all()
@@ -104,7 +104,7 @@ def test_the_columns_needed_suffice_in_any_order(tmp_path: Path):
     path = write(tmp_path / "a.csv", "\n".join(lines))
     check(path)  # velocities by central differences, exact on a parabola
     assert read(path).plate is None
-    assert read(path).number is None
+    assert number_of(path) is None
 
 
 def tracker(velocity: str = "v_{y}", names: str = "\tplatform\t\t\tpart\t\t\t") -> str:
