@@ -69,7 +69,7 @@ def hints(recording: Recording, observe: Observe, guide: str, starts: Array) -> 
     for name, values in measured.items():
         velocity = name.replace("z_", "v_", 1)
         runs = laid if velocity == guide else [observe(recording, velocity, start)]
-        shares = np.array([_of_scaled(run, values) for run in runs])
+        shares = np.array([[explained(run, x * values) for x in FACTORS] for run in runs])
         best = int(np.argmax(shares.max(axis=0)))
         hint = _hint(COLUMNS[name].text, *shares[:, [best, UNCHANGED]].max(axis=0))
         if best != UNCHANGED and hint:
@@ -91,16 +91,6 @@ def hints(recording: Recording, observe: Observe, guide: str, starts: Array) -> 
         hint = _hint(COLUMNS[guide].text, clocks[clock], clocks[1.0])
         if hint and clocks[clock] - clocks[1.0] > 0.02:
             yield f"{hint} with times multiplied by {clock:.3f}: is its frame rate right?"
-
-
-def _of_scaled(run: Array, values: Array) -> Array:
-    """What ``explained(run, factor * values)`` is for each of the FACTORS, by sums of products."""
-    known = np.isfinite(run) & np.isfinite(values)
-    run, values = run[known], values[known]
-    if not len(values) or np.ptp(values) == 0.0:
-        return np.full(len(FACTORS), np.nan)
-    missed = values @ values - 2.0 * (values @ run) / FACTORS + (run @ run) / FACTORS**2
-    return 1.0 - missed / np.sum((values - values.mean()) ** 2)
 
 
 def _of_other_motion(

@@ -12,11 +12,6 @@ SURFACE, MEASURED, SIMULATED = "#8fb8da", "0.15", "#d1495b"
 DASHED = (0, (4, 1.2))
 
 
-def _words(result: dict[str, Any]) -> str:
-    plate = f", µ_plate {result['mu_plate']:.3g}" if result["mu_plate"] else ""
-    return f"{result['parameters']} parameters: µ_k {result['mu_k']:.3g}{plate}"
-
-
 def trials(shown: Sequence[Shown], result: dict[str, Any]) -> Picture:
     """Measured heights of part and surface, and each slide as predicted, or the whole path with
     published parameters; a panel for each trial."""
@@ -40,8 +35,10 @@ def trials(shown: Sequence[Shown], result: dict[str, Any]) -> Picture:
     if fitted:
         title = headline(result)
     else:
-        error, percent = result["mean_error_mm"], result["mean_error_percent"]
-        title = f"Trials with {_words(result)}; mean error {error:.3f} mm, {percent:.2f} %"
+        title = (
+            f"Trials with published parameters: µ_k {result['mu_k']:.3g}; mean error "
+            f"{result['mean_error_mm']:.3f} mm, {result['mean_error_percent']:.2f} %"
+        )
     figure.suptitle(fill(title, 60 * columns), fontsize=12)
     return figure
 

@@ -50,9 +50,7 @@ def scene(settings: Settings, circuit: str) -> Scene:
 def rounded(settings: Settings, digits: int = RIG_DIGITS) -> Settings:
     """Settings with their numbers rounded to so many significant digits."""
     return {
-        key: value
-        if isinstance(value, str) or value == 0.0
-        else float(np.format_float_positional(value, digits, unique=False, fractional=False))
+        key: value if isinstance(value, str) else float(f"{value:.{digits}g}")
         for key, value in settings.items()
     }
 
