@@ -38,17 +38,21 @@ def each(
     return found
 
 
+SHARE, CEILING = "surface's velocity: R²", "its ceiling"
+CENTRED, LINE = "part's height: mean error, means removed [mm]", "of a straight line [mm]"
+FIRST, FIRST_LINE = "mean error from the first frame [mm]", "a straight line's from it [mm]"
+DRIFT, MEASURED = "drift [mm/s]", "measured drift [mm/s]"
 COLUMNS: dict[str, tuple[str, float]] = {
-    "surface's velocity: R²": ("velocity_r2", 1.0),
-    "its ceiling": ("velocity_r2_ceiling", 1.0),
+    SHARE: ("velocity_r2", 1.0),
+    CEILING: ("velocity_r2_ceiling", 1.0),
     "part's velocity: R²": ("part_velocity_r2", 1.0),
     "ceiling of this": ("part_velocity_r2_ceiling", 1.0),
-    "part's height: mean error, means removed [mm]": ("centred_error_mm", 1.0),
-    "of a straight line [mm]": ("centred_error_mm_straight_line", 1.0),
-    "mean error from the first frame [mm]": ("mean_error_mm", 1.0),
-    "a straight line's from it [mm]": ("mean_error_mm_straight_line", 1.0),
-    "drift [mm/s]": ("drift_simulated", 1e3),
-    "measured drift [mm/s]": ("drift_measured", 1e3),
+    CENTRED: ("centred_error_mm", 1.0),
+    LINE: ("centred_error_mm_straight_line", 1.0),
+    FIRST: ("mean_error_mm", 1.0),
+    FIRST_LINE: ("mean_error_mm_straight_line", 1.0),
+    DRIFT: ("drift_simulated", 1e3),
+    MEASURED: ("drift_measured", 1e3),
     "kick [mm/s]": ("kick_simulated", 1e3),
     "measured kick [mm/s]": ("kick_measured", 1e3),
 }
@@ -88,14 +92,13 @@ NOTES = (
 
 def message(rows: Sequence[Row]) -> str:
     """The result in a sentence."""
-    shares = [row["surface's velocity: R²"] for row in rows]
-    centred, centred_line, first, first_line = [*COLUMNS][4:8]
+    shares = [row[SHARE] for row in rows]
     # In how many trials the simulation is closer to the part's path than a straight line.
     closer, from_first = (
         sum(row[error] < row[of_line] for row in rows)
-        for error, of_line in ((centred, centred_line), (first, first_line))
+        for error, of_line in ((CENTRED, LINE), (FIRST, FIRST_LINE))
     )
-    apart = [abs(row["drift [mm/s]"] - row["measured drift [mm/s]"]) for row in rows]
+    apart = [abs(row[DRIFT] - row[MEASURED]) for row in rows]
     return (
         f"Over {len(rows)} trials the chain from the command to the part explains "
         f"{min(shares):.2f} to {max(shares):.2f} of the variance of the surface's velocity, "
@@ -115,11 +118,10 @@ def draw(rows: Sequence[Row]) -> Picture:
         3,
     )
     at, speed = range(len(rows)), "Part's mean velocity [mm/s]"
-    first, centred, line, from_first = ([*COLUMNS][k] for k in (0, 4, 5, 6))
     for axis, bars, marks, title, label in (
-        (shares, first, "its ceiling", "Surface's velocity: R²", "its own, a period later"),
-        (errors, centred, line, centred[0].upper() + centred[1:], "best straight line"),
-        (drifts, "drift [mm/s]", "measured drift [mm/s]", speed, "measured"),
+        (shares, SHARE, CEILING, "Surface's velocity: R²", "its own, a period later"),
+        (errors, CENTRED, LINE, CENTRED[0].upper() + CENTRED[1:], "best straight line"),
+        (drifts, DRIFT, MEASURED, speed, "measured"),
     ):
         axis.bar(at, [row[bars] for row in rows], 0.6, color=BLUE, label="simulated")
         values = [row[marks] for row in rows]
@@ -129,9 +131,9 @@ def draw(rows: Sequence[Row]) -> Picture:
         axis.margins(y=0.25)
         axis.legend(fontsize=8, ncols=2, loc="upper left")
         axis.set_title(title, loc="left", fontsize=10.5)
-    values = [row[from_first] for row in rows]
+    values = [row[FIRST] for row in rows]
     errors.plot(at, values, "k.", label="from the first frame (the paper's)")
     errors.margins(y=0.5)
     errors.legend(fontsize=8, loc="upper left")
-    shares.set_ylim(min(0.0, *(row[first] for row in rows)), 1.25)
+    shares.set_ylim(min(0.0, *(row[SHARE] for row in rows)), 1.25)
     return figure
