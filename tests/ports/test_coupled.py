@@ -438,6 +438,21 @@ def test_feedthrough_one_way_that_no_fmu_declares_is_as_exact(tmp_path: Path) ->
     assert error(run, fine) <= 1.5 * apart(plain["time"], plain["vf#branch"], fine)
 
 
+def test_feedthrough_that_shows_at_the_end_alone_is_told(tmp_path: Path) -> None:
+    """A diode with a threshold: without repeated steps its voltage reached 2.7 V on 1 V."""
+    recompiled(tmp_path, ("m->r[D] * m->r[U]", "m->r[D] * fmax(0.0, m->r[U] - 0.02)"))
+    build(tmp_path, "Load")
+    (tmp_path / "rl.cir").write_text(f"* load\n{RL}Vf y 0 0\n.end\n")
+    (tmp_path / "load.toml").write_text(LOAD)
+    summary = here(tmp_path / "load.toml", {"fmu.load.D": 100.0}).summary
+    assert summary["method"] == "step-locked" and summary["Vf.greatest"] > 2.0
+    assert any("load.u to load.y" in n and '"redo" is as exact' in n for n in summary["notes"])
+    redo = {"fmu.load.D": 100.0, "coupling.method": "redo"}
+    summary = here(tmp_path / "load.toml", redo).summary
+    assert summary["Vf.greatest"] == pytest.approx(100.0 * (1.0 - 0.02) / 101.0, rel=1e-3)
+    assert not any("load.u to load.y" in note for note in summary["notes"])
+
+
 def test_feedthrough_of_a_product_that_no_fmu_declares_is_as_exact(tmp_path: Path) -> None:
     """Of two inputs that begin at 0, so that neither alone changes it."""
     recompiled(tmp_path, ("m->r[D] * m->r[U]", "m->r[D] * m->r[U] * m->r[X1]"))

@@ -76,12 +76,20 @@ class Plan:
         }
         """Places of outputs that feed an FMU which steps before their own FMU."""
         needs = self._needs | self._seen()
-        through, self.circle = self._feedthrough(needs), _circle(needs)
+        self._through = through = self._feedthrough(needs)
+        self.circle = _circle(needs)
         """The variables of an algebraic loop of FMUs, in words, or ""."""
         self.method = _method(scene, self.sides, through, self.circle)
         self.notes += _notes(scene, self.sides, self.method, through, self.circle)
         self.throughs = [*self._throughs()] if self.method == "redo" else []
         """Feedthrough from a probe to a source, which the circuit solves itself, and its feed."""
+
+    def late_notes(self) -> Iterator[str]:
+        """Sentences on feedthrough that the start of a run did not show, and its end does, as that
+        of a diode."""
+        known = self.method == "redo" or self._through
+        if not known and (through := self._feedthrough(self._needs | self._seen())):
+            yield _late(through, self.method, _cure(self.sides))
 
     def deck(self) -> Deck:
         """The circuit's netlist."""
@@ -300,18 +308,26 @@ def _method(scene: Scene, sides: list[Side], through: str, circle: str) -> str:
     return asked
 
 
+def _cure(sides: list[Side]) -> str:
+    if _able(sides):
+        return 'coupling.method = "redo" is as exact as one netlist'
+    return f"{'FMUs with ' * any(map(_fixed, sides))}smaller steps err less"
+
+
+def _late(through: str, method: str, cure: str) -> str:
+    return (
+        f"an FMU feeds {through} through at once, of which the circuit learns a step late with "
+        f'coupling.method = "{method}"; {cure}.'
+    )
+
+
 def _notes(
     scene: Scene, sides: list[Side], method: str, through: str, circle: str
 ) -> Iterator[str]:
     """Sentences on the errors that the chosen method leaves."""
-    cure = f"{'FMUs with ' * any(map(_fixed, sides))}smaller steps err less"
-    if _able(sides):
-        cure = 'coupling.method = "redo" is as exact as one netlist'
+    cure = _cure(sides)
     if through and method != "redo":
-        yield (
-            f"an FMU feeds {through} through at once, of which the circuit learns a step late with "
-            f'coupling.method = "{method}"; {cure}.'
-        )
+        yield _late(through, method, cure)
     macro = scene.coupling.macro_step
     for side in sides:
         step = side.of.step if side.of.step > 0.0 else macro

@@ -64,7 +64,10 @@ def joined(
         "wall_time": time.perf_counter() - began,
         "method": run.plan.method,
         "versions": versions() | {"ngspice": str(engine().ngspice_version)},
-        "notes": [*run.deck.notes, *run.plan.notes, *_notes(run, odd), *without],
+        "notes": [
+            *(*run.deck.notes, *run.plan.notes, *run.plan.late_notes()),
+            *(*_notes(run, odd), *without),
+        ],
     }
     return columns, summary, units
 

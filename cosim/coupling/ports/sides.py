@@ -49,6 +49,7 @@ class Side:
         self.inputs: list[Variable] = []
         self._feeds: list[tuple[Variable, int, Any]] = []
         self._kept: list[Any] = []
+        self._values: Any = ()
         self._parameters = about.parameters
         self.fmu = Fmu()
         self.saved: int | None = None
@@ -97,7 +98,8 @@ class Side:
         return made
 
     def answers(self, output: Variable) -> set[str]:
-        """The inputs with ports to which an output answers at once, seen by a nudge of each."""
+        """The inputs with ports to which an output answers at once, seen by a nudge of each: before
+        a run from the start values, after it from the last ones."""
         raw = self.instance.raw
 
         def get() -> Array:
@@ -114,12 +116,19 @@ class Side:
             # Both ways, as max(0, -u) does not answer to more of u; each on those that were moved
             # before it, as a product of inputs at zero answers to none alone.
             for way, into in product((1.0, 0.0, -1.0, 0.0), reals):
-                start = np.array(self._start(into))  # an FMU may not let an input be read
+                start = np.array(self._now(into))  # an FMU may not let an input be read
                 put(into, start + way * _NUDGE * np.maximum(np.abs(start), 1.0))
                 if not np.array_equal(now := get(), before, equal_nan=True):
                     found.add(into.name)
                 before = now
         return found
+
+    def _now(self, into: Variable) -> list[float]:
+        """The values of an input: in a run those that were set last."""
+        if not self._values:
+            return self._start(into)
+        place = _places(_grouped(self.inputs))[into.name]
+        return [*self._values[place : place + into.size]]
 
     def _start(self, into: Variable) -> list[float]:
         """The start values of an input."""
