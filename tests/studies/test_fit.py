@@ -134,14 +134,17 @@ def test_the_files(fitted: TrialResults, tmp_path: Path):
         for name in ("normal_force_weights", "misfit_um"):
             value = float(row[name]) if row[name] else None
             assert value == (told[name] and pytest.approx(told[name]))
-    names = ["fit-trials.png", "fit.csv", "fit.json"]
+    names = ["fit-forces.png", "fit-profile.png", "fit-trials.png", "fit.csv", "fit.json"]
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == names
-    assert (tmp_path / "out" / names[0]).read_bytes().startswith(b"\x89PNG")
+    for name in names[:3]:
+        assert (tmp_path / "out" / name).read_bytes().startswith(b"\x89PNG")
     assert "µ_plate" in repr(fitted)
 
 
-def test_an_evaluation_tells_how_far_forces_are_off(trials: Path):
+def test_an_evaluation_has_no_profile(trials: Path, tmp_path: Path):
     found = fit(trials, evaluate="published", solver="published")
+    found.save(tmp_path)
+    assert "fit-profile.png" not in [path.name for path in tmp_path.iterdir()]
     assert "33.78 % mean, 26.99 % median" in repr(found)
 
 

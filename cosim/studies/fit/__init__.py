@@ -29,7 +29,7 @@ SOLVER = "of the paper's parameters: exact, or the authors' fixed-step scheme"
 STUDIES = (
     Study(
         "fit.fit.fit",
-        "fit friction and normal forces to tracked trials; write table and figure",
+        "fit friction and normal forces to tracked trials; write table and figures",
         (
             folder_of_trials("folder of the trials' CSVs"),
             Option("--forces", FORCES, "FILE"),
@@ -41,7 +41,6 @@ STUDIES = (
         command="fit",
         out="results/fit",
         saves=False,
-        writes="fit.json, fit.csv",
-        figures=("fit-trials.png",),
+        writes="fit.json, fit.csv and figures",
     ),
 )

@@ -37,9 +37,11 @@ FIRST_ROW, LAST_ROWS = 3, 2
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TrialResults:
-    """Trials with their parameters and simulated motions: ``numbers``, figure and files."""
+    """Trials with their parameters and simulated motions: ``numbers``, figures and files."""
 
     shown: Sequence[Shown]
+    forces: Sequence[Force]
+    """What is known of each trial's normal force beside it."""
     numbers: dict[str, Any]
     """What ``fit.json`` holds; units as the names say, forces in weights of the part."""
 
@@ -49,11 +51,14 @@ class TrialResults:
 
     @typed
     def save(self, folder: str | os.PathLike[str]) -> None:
-        """Write ``fit.json``, ``fit.csv`` and the figure ``fit-trials.png``."""
+        """Write ``fit.json``, ``fit.csv`` and the figures ``fit-*.png``."""
         out = Path(folder)
         write_json(out / "fit.json", self.numbers)
         write_csv(out / "fit.csv", [_cells(row) for row in self.numbers["trials"]])
         self.plot().write(out / "fit-trials.png")
+        figures.forces(self.forces, self.numbers).write(out / "fit-forces.png")
+        if "profiles" in self.numbers:
+            figures.profiles(self.numbers).write(out / "fit-profile.png")
 
     def __repr__(self) -> str:
         return told(self.numbers)
@@ -164,10 +169,14 @@ def _fitted(
         "mu_plate": None if untold else ratio.value * mu_k,
         "plate_over_kinetic": None if untold else ratio.value,
         "plate_over_kinetic_90_percent": [ratio.low, ratio.high] if plate and not untold else None,
+        "profiles": {
+            trial.name: {"kinetic_friction_weights": x.tolist(), "loss": y.tolist()}
+            for trial, (x, y) in zip(trials, law.profile, strict=True)
+        },
     }
     if not given:
         numbers["mu_k_90_percent"] = list(mu_k_range)
-    return TrialResults(shown, numbers | together(rows))
+    return TrialResults(shown, known, numbers | together(rows))
 
 
 def _predicted(
@@ -253,7 +262,7 @@ def _evaluated(trials: list[Trial], known: Sequence[Force], solver: Solver) -> T
         "mu_k": published.MU_K_FITTED,
         "mu_plate": 0.0,
     }
-    return TrialResults(shown, numbers | together(rows))
+    return TrialResults(shown, known, numbers | together(rows))
 
 
 def _cells(row: dict[str, Any]) -> dict[str, Any]:

@@ -76,11 +76,13 @@ class Found:
 @dataclass(frozen=True)
 class Fit:
     """The likeliest law: the ``ratio`` µ_p/µ_k, each trial's ``kinetic`` friction µ_k F_n
-    [weights], and its ``slides``."""
+    [weights], its ``slides``, and its ``profile``: frictions [weights], and by how much the
+    negative log-likelihood of each exceeds the least."""
 
     ratio: Found
     kinetic: list[Found]
     slides: list[list[Slide]]
+    profile: list[tuple[Array, Array]]
 
 
 class _Scan:
@@ -137,17 +139,16 @@ def search(trials: Sequence[Trial], limits: Sequence[Interval], plate: bool) -> 
 def _with_intervals(slides: list[list[Slide]], scan: _Scan, limits: Sequence[Interval]) -> Fit:
     """The likeliest law of a scan, and the intervals of its numbers."""
     rows, drawn = _drawn(scan.of_slides)
-    found = []
-    for k, (grid, limit) in enumerate(zip(scan.grids, limits, strict=True)):
+    found, profiles = [], [(grid, scan.profile(k)) for k, grid in enumerate(scan.grids)]
+    for k, ((grid, profile), limit) in enumerate(zip(profiles, limits, strict=True)):
         value, count = float(scan.kinetic[k]), len(slides[k])
         if count >= FEWEST:
-            likely = _likely(grid, scan.profile(k))
-            found.append(_interval(value, likely, grid[drawn[:, k]], count, limit))
+            found.append(_interval(value, _likely(grid, profile), grid[drawn[:, k]], count, limit))
         else:  # too few to tell their scatter
             found.append(Found(value if count else float(np.sqrt(limit[0] * limit[1])), *limit))
     likely, count = _likely(scan.ratios, scan.of_all - scan.of_all.min()), sum(map(len, slides))
     ratio = _interval(float(scan.ratio), likely, scan.ratios[rows], count, (0.0, 9.0))
-    return Fit(ratio, found, slides)
+    return Fit(ratio, found, slides, profiles)
 
 
 def _drawn(tables: Sequence[Array]) -> tuple[Rows, Rows]:
