@@ -29,7 +29,14 @@ from cosim.studies.identify.problem.targets import (
 )
 from cosim.studies.identify.report.figures import FIGURES
 from cosim.studies.identify.report.scenes import Settings, scene, trial_settings
-from cosim.studies.identify.report.solved import bands, errors, nrmse, samples, shown
+from cosim.studies.identify.report.solved import (
+    bands,
+    errors,
+    nrmse,
+    samples,
+    shown,
+    told_of_trials,
+)
 from cosim.studies.identify.report.verdicts import judge, rigs_meant
 from cosim.studies.identify.run import identify
 from cosim.studies.identify.search import plan
@@ -533,6 +540,18 @@ def test_missing_frames_have_no_residual(folder: Path, tmp_path: Path) -> None:
         assert all(bands(t, rigs[0], one) for t, one in zip(trials, found[0, :, 0], strict=True))
         assert [t.frequency for t in trials] == pytest.approx([9.8, 20.2, 50.8], rel=0.02)
     assert worst[1] < 2.0 * worst[0] + 1e-3
+
+
+def test_mean_velocities_are_those_of_the_trials_scenes(folder: Path) -> None:
+    """The search's own steps gave 0.743 mm/s for 0.749 in a slow trial."""
+    space = read_space()
+    trials, own = read_trials(folder, space), np.array([*OWN.values()])
+    best = Found(space, point(), own, np.ones(len(own)))
+    rows, _ = told_of_trials(trials, best)
+    for trial, one, row in zip(trials, own, rows, strict=True):
+        settings, _ = trial_settings(best.settings, trial, one)
+        ran = cosim.run(scene(best.settings | settings, "limited")).summary["v_average"]
+        assert row["v_average_mm_per_s"] == pytest.approx(ran * 1e3, rel=1e-4)
 
 
 @pytest.mark.reliability

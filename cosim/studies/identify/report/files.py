@@ -43,7 +43,7 @@ NOTES = (
     "standard deviation of what was measured; 'floor' is that of the measured cycles among "
     "themselves, 'late' without the first. The part's error is the mean distance of its heights, "
     "means removed; 'straight line' is that of the best straight line. v_average is the slope of "
-    "that line.",
+    "that line, of fitted trials as their scenes run it on the circuit limited.",
     "The volts follow from the force factor, which is known only as the verdict says: they are not "
     "measured volts. A constant force on the ram does what an offset of the drive does: of the "
     "suspension's force only its change from the centre is told, and no offset is measured.",
