@@ -12,6 +12,7 @@ Winding, assumed: the 0.9 to 3.6 g of copper that make 7.1 Ohm of wire of 0.14 t
 of a few tenths of a millimetre.
 """
 
+from functools import lru_cache
 from math import expm1, inf, isfinite, sqrt
 from typing import Any
 
@@ -69,7 +70,16 @@ def rise(coil: Coil, on_time: float = inf, duty: float = 1.0, side: int = 0) -> 
     ``on_time`` (s) in each of many cycles, a share ``duty`` of the cycle; duty 0 is a single
     on-time. ``side`` 1 and -1 take the upper and lower end of the estimate, 0 its middle.
     """
-    given = {name: getattr(coil, name) for name in SPREAD}
+    return _rise(_estimate(coil), on_time, duty, side)
+
+
+def _estimate(coil: Coil) -> tuple[float, ...]:
+    return tuple(getattr(coil, name) for name in SPREAD)
+
+
+@lru_cache  # all settings of a study have one coil
+def _rise(estimate: tuple[float, ...], on_time: float, duty: float, side: int) -> float:
+    given = dict(zip(SPREAD, estimate, strict=True))
     for name, factor in SPREAD.items():
         given[name] *= factor ** (-side if name.endswith("capacity") else side)
     cycle = on_time / duty if duty else inf
@@ -102,7 +112,8 @@ def heat_limit(coil: Coil, rise_limit: float, duty: float = 1.0, on_time: float 
 def rises(coil: Coil, heat: float) -> list[list[float | None]]:
     """The rises, K, after one LIFT and in continuous use, of a current that dissipates ``heat`` (W)
     in the cold winding: lower and upper end of the estimate each, None where it is unlimited."""
-    ends = [[warmed(heat, rise(coil, *on, side)) for side in (-1, 1)] for on in _CYCLES]
+    estimate = _estimate(coil)
+    ends = [[warmed(heat, _rise(estimate, *on, side)) for side in (-1, 1)] for on in _CYCLES]
     return [[end if isfinite(end) else None for end in both] for both in ends]
 
 
