@@ -70,11 +70,12 @@ setup: $(COMPILED) $(VENV)/.locked-dev
 $(VENV)/.created: .ci/setup-system.sh $(if $(VENV_READY),,FORCE)
 	@PYTHON='$(PYTHON)' sh .ci/setup-system.sh
 
-# The Python packages for run, test, dev (which has those of the first two) or dist.
+# The Python packages for run, test, dev (which has those of the first two) or dist. While the first
+# are installed another processor compiles the C; if that fails, the next rule says why.
 $(VENV)/.locked-%: requirements/%.lock $(VENV)/.created
 	@echo "Installing the Python packages of $< into $(VENV)"
-	@$(PIP) $(LOCKED) $< || \
-		{ echo "cosim set-up: pip could not install the Python packages (see above); try again." >&2; exit 1; }
+	@$(if $(filter run,$*),$(PY) build_c.py >/dev/null 2>&1 &) $(PIP) $(LOCKED) $< || \
+		{ echo "cosim set-up: pip could not install the Python packages (see above); try again." >&2; exit 1; }; wait
 	@touch $@
 
 # This project, in place; that compiles its C.
@@ -83,6 +84,7 @@ $(COMPILED): $(VENV)/.locked-run $(VENV)/.sources $(SOURCES)
 	@$(PIP) install --no-build-isolation --no-deps \
 		--config-settings editable_mode=compat -e . || \
 		{ echo "cosim set-up: cosim could not be installed (see above)." >&2; exit 1; }
+	@touch $@
 
 # Sums of the sources, so that one that is gone, or changed but not newer, is noticed too.
 $(VENV)/.sources: $(VENV)/.created FORCE

@@ -108,6 +108,23 @@ def digest() -> str:
     return _hash(sources())
 
 
+def _recipe() -> dict[str, Any]:
+    """What the products are made of and by, beside this module."""
+    flags = [*FLAGS, *hardening()]
+    return {"sources": digest(), "compiler": compiler_version(), "flags": flags}
+
+
+def made(folder: Path) -> bool:
+    """Whether `folder` holds what `make` would put there, each file whole."""
+    try:
+        about = json.loads((folder / "build.json").read_text())
+        files = about["files"].items()
+        whole = all(_sum((folder / name).read_bytes()) == known for name, (_, known) in files)
+        return whole and _recipe().items() <= about.items()
+    except (OSError, ValueError, KeyError):
+        return False
+
+
 def make(folder: Path) -> None:
     """Compile everything into `folder`, which is replaced as a whole or left as it is."""
     folder.parent.mkdir(parents=True, exist_ok=True)
@@ -124,8 +141,7 @@ def make(folder: Path) -> None:
             made.rename(new / made.name)
         _make_fmu(new, work)
         _make_thin(new, work)
-        about: dict[str, Any] = {"sources": digest(), "compiler": compiler_version()}
-        about["flags"] = [*FLAGS, *hardening()]
+        about = _recipe()
         about["interfaces"] = {name: interface(folders) for name, folders in LIBRARIES.items()}
         about["files"] = {
             path.relative_to(new).as_posix(): [path.stat().st_size, _sum(path.read_bytes())]
@@ -399,3 +415,7 @@ def _make_thin(target: Path, work: Path) -> None:
         licences = folder / "documentation/licenses"
         licences.mkdir(parents=True)
         shutil.copyfile(FMU_LICENSE, licences / "license.txt")
+
+
+if __name__ == "__main__":
+    make(ROOT / "cosim/_compiled")

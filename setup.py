@@ -33,8 +33,10 @@ class BuildC(Command):
 
     def run(self) -> None:
         root = build_c.ROOT if self.editable_mode else Path(self.build_lib)
+        folder = root / "cosim/_compiled"
         try:
-            build_c.make(root / "cosim/_compiled")
+            if not (self.editable_mode and build_c.made(folder)):  # as the Makefile has made it
+                build_c.make(folder)
         except build_c.BuildFailed as error:
             raise CompileError(str(error)) from error
 

@@ -61,6 +61,21 @@ def test_the_same_sources_give_the_same_bytes(copy: Path) -> None:
     assert [path.name for path in (copy / "cosim").glob(".*")] == []
 
 
+def test_what_is_made_is_not_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """But where a file is damaged, or the compiler or its flags are others."""
+    folder = shutil.copytree(libraries.FOLDER, tmp_path / "compiled")
+    assert build_c.made(folder) and not build_c.made(tmp_path)
+    with monkeypatch.context() as patch:
+        patch.setattr(build_c, "FLAGS", (*build_c.FLAGS, "-g"))
+        assert not build_c.made(folder)
+    monkeypatch.setattr(build_c, "compiler_version", lambda: "another")
+    assert not build_c.made(folder)
+    monkeypatch.undo()
+    library = folder / f"loop{build_c.SUFFIX}"
+    library.write_bytes(library.read_bytes()[:-1] + b"?")
+    assert not build_c.made(folder)
+
+
 @pytest.fixture
 def hasty(tmp_path: Path) -> str:
     """The compiler, in a hurry: where what it makes is not run."""
