@@ -106,7 +106,14 @@ def period(frequency: float, loop_time: float | None) -> float:
     steps = _steps(frequency)
     if not loop_time:
         return steps / STEPS_PER_SECOND
-    return len(passes((0,) * steps, loop_time)) * loop_time
+    first, each = _lasting(loop_time)
+    return (first + (steps - 1) * each + 1) * loop_time
+
+
+def _lasting(loop_time: float) -> tuple[int, int]:
+    """The passes of the loop for which the first code of a period stays, and each later one."""
+    each = ceil(round(1 / (STEPS_PER_SECOND * loop_time), 9))  # exact quotients stay whole
+    return max(2, each - 1), each
 
 
 def passes(codes: tuple[int, ...], loop_time: float) -> tuple[int, ...]:
@@ -116,6 +123,6 @@ def passes(codes: tuple[int, ...], loop_time: float) -> tuple[int, ...]:
     maximum is written one pass after the code 0. In the next pass the counter is set to it; the
     first decrement comes later, once a step has passed since the code 0.
     """
-    each = ceil(round(1 / (STEPS_PER_SECOND * loop_time), 9))  # exact quotients stay whole
+    first, each = _lasting(loop_time)
     falling = (code for code in codes[1:] for _ in range(each))
-    return (*(codes[0],) * max(2, each - 1), *falling, 0)
+    return (*(codes[0],) * first, *falling, 0)
