@@ -71,9 +71,12 @@ def simulate(
             return checked_ports(scene, lambda: one_run(scene, progress), progress)
         return one_run(scene, progress)
     if scene.run.solver == "fast":
+        from cosim.simulation.checks import motion
         from cosim.simulation.fast import simulate_fast
 
-        return simulate_fast(scene, progress)
+        result = simulate_fast(scene, progress)
+        kind = {} if checks == "none" else motion(scene, progress)
+        return replace(result, summary=result.summary | kind)
     again = partial(simulate, progress=progress)
     if scene.rung.automatic:
         return _cheapest(scene, partial(again, checks=checks))

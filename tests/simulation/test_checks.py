@@ -9,7 +9,7 @@ import pytest
 from tqdm import tqdm
 
 import cosim
-from cosim.scene import load
+from cosim.scene import changed, load
 from cosim.simulation.checks import motion
 from cosim.simulation.simulate import simulate
 from cosim.waveforms.report import table
@@ -193,6 +193,14 @@ def test_chaotic_motion_has_a_range_of_means() -> None:
     low, high = found["v_average_range"]
     assert low < -21e-3 < high < 0.0
     assert high - low > 1e-3
+
+
+@pytest.mark.parametrize(("name", "kind"), [("repulsion", "chaotic"), ("knee", "regular")])
+def test_the_fast_solver_tells_the_kind_of_motion_too(name: str, kind: str) -> None:
+    """As the monolithic reference tells these sets apart."""
+    assert CASES[name]["chaotic"] == (kind == "chaotic")
+    fast = changed(scene_of(CASES[name]), {"run.solver": "fast", "run.average": "ends"}, "fast")
+    assert simulate(fast, checks="usual").summary["motion"] == kind
 
 
 def test_no_transport() -> None:
