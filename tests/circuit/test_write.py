@@ -94,6 +94,7 @@ def test_no_spelling_of_a_level_passes(parameters: str, tmp_path: Path) -> None:
         ("R9 v1 0 1 Rpar=1k", "write a resistor in parallel"),
         ("E9 x9 0 v1 0 laplace=s", "write another filter"),
         ("L9 v1 x9 1m ruler=3", "nothing that ngspice knows"),
+        ("B9 x9 0 V=1e+5.", r"1e\+5\. is no expression"),  # it computes 6
     ],
 )
 def test_what_ngspice_would_drop_in_silence_is_told(

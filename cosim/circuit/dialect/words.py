@@ -11,6 +11,16 @@ _DEFINITION = re.compile(r"(?<!\w)([a-z_]\w*)\s*(\([^()]*\))?\s*=(?!=)\s*")
 NUMBER = re.compile(
     r"((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(meg|mil|[tgkmunpf])?[a-z]*(?![\w.])", re.IGNORECASE
 )
+TOKEN = re.compile(
+    r"""(?P<operand>(?P<read>[vi]\s*\(\s*[^\s(){}='][^(){}=']*\))|@[\w.#]+\[\w+\]
+    |(?P<number>(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?[a-z]*)|(?P<name>[a-z_][\w.$#]*+(?!\s*\()))
+    |(?P<begin>(?P<call>[a-z_][\w.$#]*)\s*\(|[({])|(?P<end>[)}])
+    |(?P<join>\*\*|&&|\|\||<>|[=<>!]=|[*/^%&|=<>?:,])|(?P<prefix>[-+!~])
+    |[ .'\[\]]|(?P<unknown>.)""",
+    re.IGNORECASE | re.VERBOSE | re.DOTALL,
+)
+"""A token of an expression or of a line of them. Blanks, points, quotes and [ ] belong to no group;
+v() and i() are one token with what they read, since nodes are no names of parameters."""
 _FACTORS = {"t": 1e12, "g": 1e9, "meg": 1e6, "k": 1e3, "mil": 25.4e-6, "m": 1e-3, "u": 1e-6,
             "n": 1e-9, "p": 1e-12, "f": 1e-15}  # fmt: skip
 """1A is an ampere: "a" for atto exists only in later versions of ngspice."""

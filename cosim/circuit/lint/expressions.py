@@ -12,6 +12,7 @@ from itertools import pairwise
 from cosim.circuit.dialect.functions import FUNCTIONS
 from cosim.circuit.dialect.lines import Line, refuse, shown
 from cosim.circuit.dialect.words import (
+    TOKEN,
     closing,
     definitions,
     number,
@@ -60,16 +61,8 @@ _ASSIGNMENT = re.compile(r"([a-z_]\w*)=([a-z_]\w*)\b(?!\s*\()", re.IGNORECASE)
 _DROPPABLE = re.compile(r"\.model ([^\s(]+)|\.func (\w+)")
 _CALLED = re.compile(r"(\w+)\s*\(")
 _FUNC = re.compile(r"\.func\s+([a-z_]\w*)\s*\(([^()]*)\)\s*=?(.*)", re.S)
-_PIECE = re.compile(
-    r"""(?P<operand>[vi]\s*\(\s*[^\s()][^()]*\)|@[\w.#]+\[\w+\]
-    |(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?[a-z]*|[a-z_][\w.$#]*+(?!\s*\())
-    |(?P<begin>[a-z_][\w.$#]*\s*\(|[({])|(?P<end>[)}])
-    |(?P<join>\*\*|&&|\|\||<>|[=<>!]=|[*/^%&|=<>?:,])|(?P<prefix>[-+!~])""",
-    re.IGNORECASE | re.VERBOSE,
-)
-_BROKEN = re.compile(r"(?:^|[bjp])(?:[ej]|$)|[oe][ob]")
-"""In the first letters of the groups of _PIECE: a missing operand, or a missing operator."""
-_NAME = re.compile(r"[a-z_][\w.$#]*")
+_BROKEN = re.compile(r"(?:^|[bjp])(?:[ej]|$)|[oe][ob]|u")
+"""In the first letters of the groups of TOKEN: a missing operand or operator, or what is none."""
 _KEY = re.compile(r"\s*=(?!=)")
 _BODY = re.compile(r"\b[vi]\s*=(?!=)", re.IGNORECASE)
 _NEXT_KEY = re.compile(r"\b[a-z_]\w*\s*(?<![<>=!])=(?!=)", re.IGNORECASE)
@@ -202,9 +195,6 @@ def check_names(scope: Scope, names: Names) -> None:
                 in_b = element is not None and element.kind == "b"  # where {e} is the .param
                 _check_words(line, unbraced(expression) if in_b else expression, parameters)
             _check_operators(line, expression)
-            pieces = "".join(str(piece.lastgroup)[0] for piece in _PIECE.finditer(expression))
-            if pieces and (_BROKEN.search(pieces) or len(split_arguments(expression)) > 1):
-                refuse(line, f"{shown(expression.strip())} is no expression that ngspice can read")
 
 
 def _check_words(line: Line, expression: str, parameters: set[str]) -> None:
@@ -217,22 +207,22 @@ def _check_words(line: Line, expression: str, parameters: set[str]) -> None:
 
 
 def _check_operators(line: Line, expression: str) -> None:
-    """Refuse commas outside calls, and ? without :, which ngspice misreads."""
-    calls: list[bool] = []
-    counts = {"?": 0, ":": 0}
-    for piece in _PIECE.finditer(expression):
-        if piece["begin"]:
-            calls.append(piece["begin"][0] not in "({")
-        elif piece["end"] and calls:
+    """Refuse commas outside calls, ? without :, and what lacks an operand or an operator."""
+    tokens = [token for token in TOKEN.finditer(expression) if token.lastgroup]
+    what = shown(expression.strip())
+    calls = [False]  # whether the brackets around the token are a call's, the innermost last
+    for token in tokens:
+        if token["begin"]:
+            calls.append(token["call"] is not None)
+        elif token["end"] and calls[1:]:
             calls.pop()
-        elif piece[0] in counts:
-            counts[piece[0]] += 1
-        elif piece[0] == "," and calls and not calls[-1]:
-            what = shown(expression.strip())
+        elif token[0] == "," and not calls[-1]:
             refuse(line, f"the comma in {what} parts no arguments; a number has a decimal point")
-    if counts["?"] != counts[":"]:
-        what = shown(expression.strip())
+    texts = [token[0] for token in tokens]
+    if texts.count("?") != texts.count(":"):
         refuse(line, f"{what} must have a : for each ?, as in (condition ? yes : no)")
+    if tokens and _BROKEN.search("".join(str(token.lastgroup)[0] for token in tokens)):
+        refuse(line, f"{what} is no expression that ngspice can read")
 
 
 def _misused(name: str, arguments: list[str], behavioural: bool | None) -> str | None:
@@ -311,18 +301,13 @@ def check_circles(top: Scope, names: Names) -> None:
 def used(expression: str) -> Iterator[tuple[str, list[str] | None]]:
     """The names in an expression except nodes and sources: with their arguments if called, else
     with None."""
-    text, place = expression.lower(), 0
-    while piece := _PIECE.search(text, place):
-        name, place = piece[0].rstrip("( \t"), piece.end()
-        if not _NAME.fullmatch(name):
-            continue
-        end = closing(text, place - 1) if piece["begin"] else place
-        if name in ("v", "i") and piece["begin"]:
-            place = end
-        elif piece["begin"]:
-            yield name, split_arguments(text[place : end - 1])
-        elif not _KEY.match(text, place):
-            yield name, None
+    text = expression.lower()
+    for token in TOKEN.finditer(text):
+        if name := token["call"]:
+            end = closing(text, token.end() - 1)
+            yield name, split_arguments(text[token.end() : end - 1])
+        elif token["name"] and not _KEY.match(text, token.end()):
+            yield token[0], None
 
 
 def sensed(text: str, kind: str) -> Iterator[str]:

@@ -9,14 +9,11 @@ import re
 from collections.abc import Iterator, Mapping
 
 from cosim.circuit.dialect.lines import Line, refuse, shown
-from cosim.circuit.dialect.words import NUMBER, closing, definitions, word_set, words
+from cosim.circuit.dialect.words import NUMBER, TOKEN, closing, definitions, word_set, words
 from cosim.circuit.lint.allowed import MOS_LEVELS
 from cosim.circuit.lint.elements import KINDS, Element
 
 _NAME = re.compile(r"[a-z_][\w.$#]*", re.IGNORECASE)
-_NODES = re.compile(r"[vi]\s*\([^(){}=']*\)", re.IGNORECASE)
-_DEVICE = re.compile(r"@[\w.#]+\[\w+\]")
-_SIGNS = frozenset("+-*/^%()<>=!&|?:,~ {}[]'")
 _HEAD = re.compile(r"[^\s(),{}='\"`\\]+")
 _KEY = re.compile(r"([a-z_]\w*)=(?!=)", re.IGNORECASE)
 _PAIR = re.compile(r"([a-z_]\w*)=(.+)", re.IGNORECASE | re.DOTALL)
@@ -135,19 +132,12 @@ def _word(line: Line, word: str) -> str:
 
 def _expression(line: Line, text: str) -> str:
     """An expression, or a line of expressions, token by token; blanks stay where they are."""
-    found, place = "", 0
-    while place < len(text):
-        for kind in (_NODES, NUMBER, _NAME, _DEVICE):
-            if match := kind.match(text, place):
-                break
-        if match is None:
-            if text[place] not in _SIGNS and text[place] != ".":
-                refuse(line, f"{shown(text[place:])} is no expression that ngspice can read")
-            found, place = found + text[place], place + 1
-            continue
-        number = match.re is NUMBER
-        if number and re.match(r"\s*=(?!=)", text[match.end() :]):
-            refuse(line, f"{shown(match[0])} cannot be set; put a blank between two words")
-        found += f"{match[1]}{match[2] or ''}" if number else match[0]
-        place = match.end()
+    found = ""
+    for token in TOKEN.finditer(text):
+        number = NUMBER.match(text, token.start()) if token["number"] else None
+        if token["unknown"] or (token["number"] and (number is None or number[0] != token[0])):
+            refuse(line, f"{shown(text[token.start() :])} is no expression that ngspice can read")
+        if number and re.match(r"\s*=(?!=)", text[token.end() :]):
+            refuse(line, f"{shown(token[0])} cannot be set; put a blank between two words")
+        found += f"{number[1]}{number[2] or ''}" if number else token[0]
     return found
