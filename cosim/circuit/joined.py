@@ -307,8 +307,8 @@ def _check_vectors(top: Scope, wanted: Iterable[Line]) -> None:
 
 def own_parameters(top: Scope, name: str, given: Mapping[str, float]) -> dict[str, float]:
     """The values given to ``.param`` lines, by their names in small letters. Raises BadInput."""
-    lines = [line.text for line, _ in top.lines if line.text.lower().startswith(".param")]
-    known = [key for text in lines for (key, formal), _ in definitions(text) if formal is None]
+    every = (each for line, _ in top.lines for each in definitions(line))
+    known = [each.name for each in every if each.formals is None]
     for key in given:
         if key.lower() not in known:
             able = [each for each in known if not each.startswith("cosim_")]

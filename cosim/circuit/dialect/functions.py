@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from math import pi
 
 from cosim.circuit.dialect.lines import Line
-from cosim.circuit.dialect.words import closing, split_arguments
+from cosim.circuit.dialect.words import closing, definitions, split_arguments
 
 # The switch's control c, scaled to -0.5 at "off" (f) and 0.5 at "on" (n).
 _WAY = "min(max((c-0.5*(n+f))/(n-f),-0.5),0.5)"
@@ -40,7 +40,6 @@ FUNCTIONS = {
 keeps the slope of roots finite at 0. The logarithm of a switch's resistance is a cubic of its
 control (Cadence, *PSpice Reference Guide*, voltage-controlled switch)."""
 _CALL = re.compile(r"(?<![\w.])([a-z_]\w*)\s*\(")
-_DEFINED = re.compile(r"\.func\s+(\w+)|(\w+)\s*(?:\([^()]*\)\s*)?=(?!=)")
 _PI = re.compile(r"(?<![\w.])pi(?!\w|\s*\()")
 _CONSTANTS = {"pi": pi, "boltz": 1.380649e-23, "echarge": 1.602176634e-19, "kelvin": -273.15}
 """LTspice's, in J/K, C and degrees Celsius; of ``pi`` B sources know themselves."""
@@ -55,8 +54,7 @@ def prelude(lines: Sequence[Line]) -> list[Line]:
     defined, temperature = set[str](), "27"
     for line in lines:
         text = line.text.lower()
-        if text.startswith((".func", ".param")):
-            defined.update(*_DEFINED.findall(text))
+        defined.update(each.name for each in definitions(line))
         if ("{" in text or "'" in text or text.startswith(".param")) and _PI.search(text):
             called["pi"] = {0}
         called |= {key: {0} for key in _NATURE.findall(text)}
@@ -69,7 +67,7 @@ def prelude(lines: Sequence[Line]) -> list[Line]:
                 inside = text[match.end() : closing(text, match.end() - 1) - 1]
                 called.setdefault(match[1], set()).add(len(split_arguments(inside)))
     found = [
-        f".func {name}({formals}) {{{body}}}"
+        f".param {name}({formals})={{{body}}}"
         for name, (formals, body) in FUNCTIONS.items()
         if name not in defined and len(formals.split(",")) in called.get(name, ())
     ]

@@ -15,7 +15,7 @@ from cosim.circuit.dialect.laplace import without_laplace
 from cosim.circuit.dialect.lines import Line
 from cosim.circuit.dialect.operators import respelt
 from cosim.circuit.dialect.parts import MAKERS, REMARKS, with_law, with_memory, with_parts
-from cosim.circuit.dialect.words import MODEL, WORD, taken
+from cosim.circuit.dialect.words import FUNC, MODEL, WORD, taken
 
 _LETTERS = str.maketrans(
     {"\u00b5": "u", "\u03bc": "u", "\u03a9": "ohm", "\u2126": "ohm", "\u00a7": "_"}
@@ -87,6 +87,8 @@ def _parts_of(text: str) -> Sequence[str]:
         word, _, rest = text.partition(" ")
         rest = rest if "=" in rest else _UNEQUAL.sub(r"\1=", f" {rest}")
         return [f"{_SYNONYMS.get(word.lower(), word)} {rest}"]
+    if function := FUNC.fullmatch(text):
+        return [f".param {function[1]}={function[2]}"]
     if text.lower().startswith((".ic", ".nodeset")):
         return [re.sub(r"\)\s+(?=[{'\d.+-])", ")=", text)]
     if model := MODEL.match(text):

@@ -3,9 +3,14 @@
 import re
 from collections.abc import Collection
 from functools import cache
+from typing import NamedTuple
+
+from cosim.circuit.dialect.lines import Line
 
 _ASSIGNED = re.compile(r"\s*(?<![<>=!])=(?!=)\s*")  # "=", but no comparison
-_DEFINITION = re.compile(r"(?<!\w)([a-z_]\w*)\s*(\([^()]*\))?\s*=(?!=)\s*")
+_FORMALS = r"\(\s*(?:[a-z_]\w*(?:\s*,\s*[a-z_]\w*)*\s*)?\)"
+_DEFINITION = re.compile(rf"(?<!\w)([a-z_]\w*)\s*({_FORMALS})?\s*=(?!=)\s*")
+FUNC = re.compile(rf"\.func\s+([a-z_]\w*\s*{_FORMALS})\s*=?(?!=)\s*(\S.*)", re.IGNORECASE)
 
 
 NUMBER = re.compile(
@@ -111,13 +116,29 @@ def split_arguments(text: str) -> list[str]:
     return found if text.strip() else []
 
 
-def definitions(text: str) -> list[tuple[tuple[str, str | None], str]]:
-    """The definitions of a ``.param`` line: name, formal parameters (of a function), expression."""
-    body = text.partition(" ")[2].lower()
+class Definition(NamedTuple):
+    """A function with its formal parameters, or a parameter, which has None there."""
+
+    name: str
+    formals: list[str] | None
+    body: str
+    line: Line
+
+
+def definitions(line: Line) -> list[Definition]:
+    """The definitions of a line, lower case; none if it is no ``.param`` line."""
+    if not line.text.lower().startswith(".param"):
+        return []
+    body = line.text.partition(" ")[2].lower()
     starts = [*_DEFINITION.finditer(unbraced(body))]
     ends = [match.start() for match in starts[1:]] + [len(body)]
     return [
-        ((match[1], match[2]), body[match.end() : end].strip(" ,"))
+        Definition(
+            match[1],
+            re.findall(r"\w+", match[2]) if match[2] else None,
+            body[match.end() : end].strip(" ,"),
+            line,
+        )
         for match, end in zip(starts, ends, strict=False)
     ]
 

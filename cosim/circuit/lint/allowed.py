@@ -13,7 +13,7 @@ from cosim.circuit.lint.elements import KINDS
 
 MAX_WORD = 4_000
 KEPT = word_set(
-    ".param .func .subckt .ends .model .ic .nodeset .global .options .option .opt .temp "
+    ".param .subckt .ends .model .ic .nodeset .global .options .option .opt .temp "
     ".if .elseif .else .endif"
 )
 DROPPED = word_set(
@@ -79,6 +79,10 @@ def passed(line: Line) -> str | None:
         return None
     if word == ".ends":
         return word  # libraries have remarks behind it
+    if word == ".func":  # the others are .param lines by now
+        refuse(
+            line, f"{shown(line.text)} is no complete .func line; write .func NAME(X,...) {{...}}"
+        )
     if word and word not in KEPT:
         till = ", and all up to .endc: a scene tells what is run" if word == ".control" else ""
         refuse(line, f"{shown(word)} is not allowed in a netlist; leave it out{till}")

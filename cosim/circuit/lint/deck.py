@@ -124,8 +124,7 @@ class _Reader:
 
     def _stepped(self) -> Iterator[Line]:
         """.param lines, with its first value, for each parameter that only a .step line defines."""
-        own = (line.text for line in self.lines if line.text.lower().startswith(".param"))
-        known = {name for text in own for (name, _), _ in definitions(text)}
+        known = {each.name for line in self.lines for each in definitions(line)}
         for line in self.dropped:
             step = _STEP.match(line.text)
             if step and step[1].lower() not in known:

@@ -227,7 +227,6 @@ class _Parser:
             ".ends": self._ends,
             **dict.fromkeys((".if", ".elseif", ".else", ".endif"), self._conditional),
             ".param": self._param,
-            ".func": self._func,
             ".model": self._model,
             ".global": lambda line, found: self.top.globals.update(found[1:]),
         }
@@ -273,17 +272,11 @@ class _Parser:
             self.ifs.pop()
 
     def _param(self, line: Line, found: list[str]) -> None:
-        given = definitions(line.text)
-        if not given or not all(expression for _, expression in given):
+        given = definitions(line)
+        if not given or not all(each.body for each in given):
             refuse(line, ".param gives no name a value; write NAME=VALUE")
-        for (name, formal), _ in given:
-            (self.scope.parameters if formal is None else self.scope.functions).add(name)
-
-    def _func(self, line: Line, found: list[str]) -> None:
-        match = re.match(r"\.func\s+([a-z_]\w*)\s*\(", line.text, re.IGNORECASE)
-        if match is None:
-            refuse(line, f"{shown(line.text)} is no complete .func line")
-        self.scope.functions.add(match[1].lower())
+        for each in given:
+            (self.scope.parameters if each.formals is None else self.scope.functions).add(each.name)
 
     def _model(self, line: Line, found: list[str]) -> None:
         if len(found) < 3:

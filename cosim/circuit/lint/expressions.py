@@ -5,7 +5,6 @@ An undefined parameter does not only fail the run: ngspice gives up for the rest
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
 
@@ -13,6 +12,7 @@ from cosim.circuit.dialect.functions import FUNCTIONS
 from cosim.circuit.dialect.lines import Line, refuse, shown
 from cosim.circuit.dialect.words import (
     TOKEN,
+    Definition,
     closing,
     definitions,
     number,
@@ -58,25 +58,14 @@ _POINT = re.compile(
 )
 # KEY=NAME, without a call.
 _ASSIGNMENT = re.compile(r"([a-z_]\w*)=([a-z_]\w*)\b(?!\s*\()", re.IGNORECASE)
-_DROPPABLE = re.compile(r"\.model ([^\s(]+)|\.func (\w+)")
+_DROPPABLE = re.compile(r"\.model ([^\s(]+)|\.param (\w+)\s*\(")
 _CALLED = re.compile(r"(\w+)\s*\(")
-_FUNC = re.compile(r"\.func\s+([a-z_]\w*)\s*\(([^()]*)\)\s*=?(.*)", re.S)
 _BROKEN = re.compile(r"(?:^|[bjp])(?:[ej]|$)|[oe][ob]|u")
 """In the first letters of the groups of TOKEN: a missing operand or operator, or what is none."""
 _KEY = re.compile(r"\s*=(?!=)")
 _BODY = re.compile(r"\b[vi]\s*=(?!=)", re.IGNORECASE)
 _NEXT_KEY = re.compile(r"\b[a-z_]\w*\s*(?<![<>=!])=(?!=)", re.IGNORECASE)
 _SOURCE = re.compile(r"\b(?:value|vol|cur)\s*=?\s*$", re.IGNORECASE)
-
-
-@dataclass(frozen=True)
-class _Function:
-    """A function that the netlist defines."""
-
-    name: str
-    formals: tuple[str, ...]
-    body: str
-    line: Line
 
 
 class Names:
@@ -92,24 +81,23 @@ class Names:
             self.parameters[id(scope)] = set().union(*(s.parameters for s in chain))
             self.functions[id(scope)] = set().union(*(s.functions for s in chain))
         lines = [line.text.lower() for s in scopes for line, _ in s.lines]
-        self.definitions: dict[str, list[_Function]] = {}
+        self.definitions: dict[str, list[Definition]] = {}
         """The user's functions by name, whatever their scope."""
-        for scope in scopes:
-            for line, _ in scope.lines:
-                for function in _functions(line):
-                    self.definitions.setdefault(function.name, []).append(function)
+        for each in (each for s in scopes for line, _ in s.lines for each in definitions(line)):
+            if each.formals is not None:
+                self.definitions.setdefault(each.name, []).append(each)
         self.checked: set[tuple[str, bool | None]] = set()
         """Names of functions whose bodies have been checked, with ``behavioural``."""
         self.calls: dict[str, int] = {}
         """By a function's name: how many calls ngspice makes of one when it expands it."""
         self.mentioned = {word for s in scopes for e in s.elements for word in [e.model, *e.words]}
-        calls = (text.partition(")")[2] if text.startswith(".func") else text for text in lines)
+        calls = (text.partition(")")[2] if _DROPPABLE.match(text) else text for text in lines)
         self.called = {name for text in calls for name in _CALLED.findall(text)}
         growing = True
         while growing:
             growing = sum(self._inherit(scope) for scope in scopes) > 0
 
-    def only(self, name: str) -> _Function | None:
+    def only(self, name: str) -> Definition | None:
         """The function of this name, if there is exactly one."""
         found = self.definitions.get(name, [])
         return found[0] if len(found) == 1 else None
@@ -130,7 +118,9 @@ class Names:
         if match is None:
             return False
         model, function = match.groups()
-        return function not in self.called if function else model not in self.mentioned
+        if model:
+            return model not in self.mentioned
+        return function not in self.called and len(definitions(line)) == 1
 
     def is_parameter(self, scope: Scope, name: str) -> bool:
         return name in self.parameters[id(scope)] or name in CONSTANTS
@@ -143,8 +133,9 @@ class Names:
         function = self.only(name)
         if function is None:  # several have this name
             return
-        if len(arguments) != len(function.formals):
-            wanted = _counted(len(function.formals))
+        count = len(function.formals or ())
+        if len(arguments) != count:
+            wanted = _counted(count)
             refuse(line, f"the function {shown(name)} takes {wanted}, not {len(arguments)}")
         if (name, behavioural) in self.checked:
             return
@@ -177,12 +168,12 @@ def check_names(scope: Scope, names: Names) -> None:
     for line, element in scope.lines:
         if names.drops(line):
             continue
-        defined = list(_functions(line))
-        known = parameters.union(*(function.formals for function in defined))
+        formals = [each.formals for each in definitions(line) if each.formals is not None]
+        known = parameters.union(*formals)
         for expression, in_source in _expressions(line, element):
             loose = in_source or (element is not None and element.kind in "beg")
             # A function's definition does not tell which parser will evaluate it.
-            behavioural = in_source or (None if defined else False)
+            behavioural = in_source or (None if formals else False)
             for name, arguments in used(expression):
                 if arguments is None:
                     if name not in known and not (loose and name in BEHAVIOURAL_CONSTANTS):
@@ -286,11 +277,10 @@ def check_circles(top: Scope, names: Names) -> None:
     if any(line.text.lower().startswith(".if") for line, _ in top.lines):
         return
     for line, _ in top.lines:
-        if line.text.lower().startswith(".param"):
-            for (name, formal), expression in definitions(line.text):
-                if formal is None and name not in uses:
-                    uses[name] = {n for n, arguments in used(expression) if arguments is None}
-                    lines[name] = line
+        for name, formals, expression, _ in definitions(line):
+            if formals is None and name not in uses:
+                uses[name] = {n for n, arguments in used(expression) if arguments is None}
+                lines[name] = line
     try:
         TopologicalSorter(uses).prepare()
     except CycleError as error:
@@ -328,8 +318,8 @@ def _expressions(line: Line, element: Element | None) -> Iterator[tuple[str, boo
     text = line.text
     word = text.split()[0].lower()
     if word == ".param":
-        for _, expression in definitions(text):
-            yield expression, _varies(expression)
+        for each in definitions(line):
+            yield each.body, _varies(each.body)
         return
     if word.startswith((".if", ".elseif")):
         condition = text[text.lower().index("if") + 2 :]
@@ -361,17 +351,3 @@ def _expressions(line: Line, element: Element | None) -> Iterator[tuple[str, boo
 
 def _varies(expression: str) -> bool:
     return _VARYING.search(expression) is not None
-
-
-def _functions(line: Line) -> Iterator[_Function]:
-    lower = line.text.lower()
-    if match := _FUNC.match(lower):
-        yield _Function(match[1], _formals(match[2]), match[3].strip().strip("{}'"), line)
-    elif lower.startswith(".param"):
-        for (name, formal), expression in definitions(lower):
-            if formal is not None:
-                yield _Function(name, _formals(formal), expression.strip("{}'"), line)
-
-
-def _formals(text: str) -> tuple[str, ...]:
-    return tuple(re.findall(r"\w+", text))

@@ -9,7 +9,15 @@ import re
 from collections.abc import Iterator, Mapping
 
 from cosim.circuit.dialect.lines import Line, refuse, shown
-from cosim.circuit.dialect.words import NUMBER, TOKEN, closing, definitions, word_set, words
+from cosim.circuit.dialect.words import (
+    NUMBER,
+    TOKEN,
+    Definition,
+    closing,
+    definitions,
+    word_set,
+    words,
+)
 from cosim.circuit.lint.allowed import MOS_LEVELS
 from cosim.circuit.lint.elements import KINDS, Element
 
@@ -44,11 +52,7 @@ def written(line: Line, element: Element | None, values: Mapping[str, float]) ->
     if element is not None:
         return _element(element)
     if word == ".param":
-        return "\n".join(
-            f".param {name}{formal or ''}="
-            + (repr(values[name]) if name in values else _expression(line, expression))
-            for (name, formal), expression in definitions(text)
-        )
+        return "\n".join(_definition(line, each, values) for each in definitions(line))
     if word == ".model":
         return _model(line)
     if word in (".ic", ".nodeset"):
@@ -58,7 +62,14 @@ def written(line: Line, element: Element | None, values: Mapping[str, float]) ->
         return " ".join([word, *(_word(line, each) for each in (_called(name), *rest))])
     if word in (".ends", ".global"):
         return " ".join([word, *(_word(line, each) for each in words(text)[1:])])
-    return _expression(line, text)  # of functions and conditions; options are numbers
+    return _expression(line, text)  # of conditions; options are numbers
+
+
+def _definition(line: Line, each: Definition, values: Mapping[str, float]) -> str:
+    if each.formals is not None:
+        return f".func {each.name}({','.join(each.formals)}) {_expression(line, each.body)}"
+    value = repr(values[each.name]) if each.name in values else _expression(line, each.body)
+    return f".param {each.name}={value}"
 
 
 def _called(name: str) -> str:
