@@ -8,7 +8,7 @@ import re
 from itertools import chain, combinations_with_replacement, count, pairwise
 
 from cosim.circuit.dialect.lines import MAX_LINE, MOST
-from cosim.circuit.dialect.words import closing, number, split_arguments, words
+from cosim.circuit.dialect.words import arguments_of, number, words
 
 _TABLE = re.compile(r"(?<![\w.])(?:table|tbl)\s*\(", re.IGNORECASE)
 
@@ -18,9 +18,8 @@ def without_tables(text: str) -> str:
     if text[:1].lower() in "eg":
         text = re.sub(r"(?i)(?<=\s)table\s*=\s*", "table ", text)  # the source's own, see below
     for match in [*_TABLE.finditer(text)][:MOST][::-1]:
-        end = closing(text, match.end() - 1)
-        x, *points = split_arguments(text[match.end() : end - 1]) or [""]
-        call = _lines(x, points)
+        given, end = arguments_of(text, match.end() - 1)
+        call = _lines(given[0], given[1:]) if given else None
         if call is not None and len(text) + len(call) < MAX_LINE:
             text = text[: match.start()] + call + text[end:]
     return text

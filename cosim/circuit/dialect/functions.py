@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from math import pi
 
 from cosim.circuit.dialect.lines import Line
-from cosim.circuit.dialect.words import closing, definitions, split_arguments
+from cosim.circuit.dialect.words import arguments_of, definitions
 
 # The switch's control c, scaled to -0.5 at "off" (f) and 0.5 at "on" (n).
 _WAY = "min(max((c-0.5*(n+f))/(n-f),-0.5),0.5)"
@@ -39,40 +39,34 @@ FUNCTIONS = {
 ``pwr`` has the sign of x, ``pow`` never a sign): formal parameters, and the body for ngspice. 1e-99
 keeps the slope of roots finite at 0. The logarithm of a switch's resistance is a cubic of its
 control (Cadence, *PSpice Reference Guide*, voltage-controlled switch)."""
-_CALL = re.compile(r"(?<![\w.])([a-z_]\w*)\s*\(")
-_PI = re.compile(r"(?<![\w.])pi(?!\w|\s*\()")
+# A name, and the sign behind it by which it is a function, or is set.
+_NAME = re.compile(r"(?<![\w.])([a-z_]\w*+)(?:\s*(\(|=(?!=)))?")
 _CONSTANTS = {"pi": pi, "boltz": 1.380649e-23, "echarge": 1.602176634e-19, "kelvin": -273.15}
 """LTspice's, in J/K, C and degrees Celsius; of ``pi`` B sources know themselves."""
-_NATURE = re.compile(r"(?<![\w.])(boltz|echarge|kelvin)(?!\w|\s*\()")
 _TEMP = re.compile(r"\.(?:temp\b[\s=]*|opt\w*\s(?:.*[\s,])?temp\s*=\s*)(\{[^{}]*\}|[^\s,]+)", re.I)
-_WARMTH = re.compile(r"(?<![\w.])temp(?!\w|\s*[=(])")
 
 
 def prelude(lines: Sequence[Line]) -> list[Line]:
     """Definitions of the foreign functions and constants that the lines use but do not define."""
     called: dict[str, set[int]] = {}  # numbers of arguments by name
-    defined, temperature = set[str](), "27"
+    constants, defined, temperature = set[str](), set[str](), "27"
     for line in lines:
         text = line.text.lower()
         defined.update(each.name for each in definitions(line))
-        if ("{" in text or "'" in text or text.startswith(".param")) and _PI.search(text):
-            called["pi"] = {0}
-        called |= {key: {0} for key in _NATURE.findall(text)}
         if temp := _TEMP.match(text):
             temperature = temp[1]
-        elif _WARMTH.search(text):
-            called["temp"] = {0}
-        for match in _CALL.finditer(text):
-            if match[1] in FUNCTIONS:
-                inside = text[match.end() : closing(text, match.end() - 1) - 1]
-                called.setdefault(match[1], set()).add(len(split_arguments(inside)))
+        needs_pi = "{" in text or "'" in text or text.startswith(".param")
+        for match in _NAME.finditer(text):
+            name, sign = match.groups()
+            if sign == "(" and name in FUNCTIONS:
+                called.setdefault(name, set()).add(len(arguments_of(text, match.end() - 1)[0]))
+            elif sign is None and (name != "pi" or needs_pi):
+                constants.add(name)
     found = [
         f".param {name}({formals})={{{body}}}"
         for name, (formals, body) in FUNCTIONS.items()
         if name not in defined and len(formals.split(",")) in called.get(name, ())
     ]
-    wanted = (name for name in _CONSTANTS if name in called and name not in defined)
-    found += [f".param {name}={_CONSTANTS[name]!r}" for name in wanted]
-    if "temp" in called and "temp" not in defined:
-        found.append(f".param temp={temperature}")
+    known = _CONSTANTS | {"temp": temperature}
+    found += [f".param {name}={known[name]}" for name in known if name in constants - defined]
     return [Line(text, lines[0].file, 1) for text in found]

@@ -6,15 +6,7 @@ from collections.abc import Iterator
 
 from cosim.circuit.dialect.lines import MAX_LINE, MOST
 from cosim.circuit.dialect.operators import SPLIT
-from cosim.circuit.dialect.words import (
-    VALUE,
-    WORD,
-    closing,
-    number,
-    split_arguments,
-    taken,
-    word_set,
-)
+from cosim.circuit.dialect.words import VALUE, WORD, arguments_of, number, taken, word_set
 
 MAKERS = word_set("mfg pn type pppkg iave vpk vceo icrating qg")
 REMARKS = {
@@ -124,9 +116,9 @@ def with_memory(text: str) -> Iterator[str]:
         match = [*_MEMORY.finditer(text, text.find("=") + 1)][-1:]  # the last: inner calls first
         if not match or len(text) > MAX_LINE // 2 or "=" not in text:
             break
-        start, what, after = match[0].start(), match[0][1].lower(), match[0].end()
-        end = closing(text, after - 1)
-        x, *more = (each.strip() for each in split_arguments(text[after : end - 1]) or [""])
+        start, what = match[0].start(), match[0][1].lower()
+        given, end = arguments_of(text, match[0].end() - 1)
+        x, *more = (each.strip() for each in given or [""])
         node = f"{text.split()[0]}_{what}{place}"
         if what == "delay" and len(more) == 1 and not _CHANGING.search(more[0]):
             yield f"b{node} {node}_in 0 v=2*({x})"

@@ -102,18 +102,18 @@ def closing(text: str, place: int) -> int:
     return len(text)
 
 
-def split_arguments(text: str) -> list[str]:
-    """The parts between commas outside brackets."""
-    found = [""]
-    place = 0
-    while place < len(text):
-        end = closing(text, place) if text[place] in "({'" else place + 1
-        if text[place] == ",":
+def arguments_of(text: str, place: int) -> tuple[list[str], int]:
+    """The arguments of the call whose bracket is at ``place``, and the place after the call."""
+    end = closing(text, place)
+    inside, found, place = text[place + 1 : end - 1], [""], 0
+    while place < len(inside):
+        after = closing(inside, place) if inside[place] in "({'" else place + 1
+        if inside[place] == ",":
             found.append("")
         else:
-            found[-1] += text[place:end]
-        place = end
-    return found if text.strip() else []
+            found[-1] += inside[place:after]
+        place = after
+    return (found if inside.strip() else []), end
 
 
 class Definition(NamedTuple):

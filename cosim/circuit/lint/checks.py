@@ -177,30 +177,30 @@ def _check_passive(element: Element, scope: Scope, names: Names) -> None:
         element.words[0] = f"{{{first}}}"  # ngspice takes a bare word for a model
 
 
-def _values(words: Sequence[str]) -> list[str]:
-    """A waveform's values: the words up to another waveform or an assignment."""
-    return [*takewhile(lambda word: word not in _WAVEFORMS and "=" not in word, words)]
+def _values(words: Sequence[str], wave: str) -> list[str]:
+    """A waveform's values: the words behind it up to another waveform or an assignment."""
+    after = words[words.index(wave) + 1 :] if wave in words else []
+    return [*takewhile(lambda word: word not in _WAVEFORMS and "=" not in word, after)]
 
 
 def _check_source(element: Element, scope: Scope, names: Names) -> None:
     for wave, most in _WAVES.items():
-        after = element.words[element.words.index(wave) + 1 :] if wave in element.words else []
-        if len(_values(after)) > most:
+        values = _values(element.words, wave)
+        if len(values) > most:
             element.refuse(
                 f": {wave.upper()} takes {most} values; leave out the next, a number of periods to "
                 "LTspice and a phase to ngspice, or write that many as PWL"
             )
-        if wave == "sin" in element.words and number([*_values(after), "0", "0", "0"][2]) == 0.0:
+        if wave == "sin" in element.words and number([*values, "0", "0", "0"][2]) == 0.0:
             element.refuse(": SIN has no frequency; give one above 0, or its DC value alone")
-    if "pwl" in element.words:
-        after = element.words[element.words.index("pwl") + 1 :]
-        if any(word.startswith("+") for word in after[::2]):
-            element.refuse(": write the times of PWL since the start, not since the last one")
-        if "repeat" in after:
-            element.refuse(": instead of REPEAT write r=0 after the points of PWL")
-        for last, time in pairwise(map(number, _values(after)[::2])):
-            if last is not None and time is not None and last > time:
-                element.refuse(f": the times of PWL must rise, {time:g} s comes after {last:g} s")
+    points = _values(element.words, "pwl")
+    if any(word.startswith("+") for word in points[::2]):
+        element.refuse(": write the times of PWL since the start, not since the last one")
+    if "repeat" in points:
+        element.refuse(": instead of REPEAT write r=0 after the points of PWL")
+    for last, time in pairwise(map(number, points[::2])):
+        if last is not None and time is not None and last > time:
+            element.refuse(f": the times of PWL must rise, {time:g} s comes after {last:g} s")
     for word in element.words:
         plain = word.lstrip("+-")
         if _OPERATOR.search(unbraced(word)):

@@ -13,10 +13,10 @@ from cosim.circuit.dialect.lines import Line, refuse, shown
 from cosim.circuit.dialect.words import (
     TOKEN,
     Definition,
+    arguments_of,
     closing,
     definitions,
     number,
-    split_arguments,
     unbraced,
     word_set,
 )
@@ -294,8 +294,7 @@ def used(expression: str) -> Iterator[tuple[str, list[str] | None]]:
     text = expression.lower()
     for token in TOKEN.finditer(text):
         if name := token["call"]:
-            end = closing(text, token.end() - 1)
-            yield name, split_arguments(text[token.end() : end - 1])
+            yield name, arguments_of(text, token.end() - 1)[0]
         elif token["name"] and not _KEY.match(text, token.end()):
             yield token[0], None
 
