@@ -134,6 +134,7 @@ Ro to 0 50
 .param mode = 2 , gain=3 k={gain*2}
 .func lim(x,lo,hi) {max(lo, min(hi, x))}
 .func sq(x) 'x*x'
+.func cube (x) = x*sq(x)
 .param h(x)='sq(x)+k'
 .if (mode == 1)
 Rx v1 x 1k
@@ -188,6 +189,8 @@ Rm v1 0 rmod L=10u W=1u
 Vr r1 0 PULSE (0,1,0,1n,1n,1u,2u)
 Vp r2 0 dc 1 ac 1 0 PWL(0 0 1m 1
 + 2m 0)
+Vq r4 0 PWL(0 0 1m 1) ac 1 +90
+Rr4 r4 0 1k
 I1 0 r3 {1m}
 Rr3 r3 0 1k tc1=1m tc2={1u}
 """,
