@@ -129,6 +129,10 @@ def test_exchanged_wires_are_the_other_command() -> None:
             ]
         )
     assert mirrored.numbers["v_average"] == pytest.approx(falling.numbers["v_average"], rel=1e-6)
+    for polarity in (1, -1):
+        device = load("reference", {"coil.polarity": polarity})
+        exchanged = NAMED["coil's wires exchanged"].machine(device).settings
+        assert changed(device, exchanged, "a test").coil.polarity == -polarity
 
 
 def test_a_square_is_three_of_six_levels_up_and_a_sine_nearly_its_six() -> None:
@@ -278,6 +282,26 @@ def test_gains_are_paired_on_each_rig() -> None:
     assert not gains(more, BY_NAME["v_up"])[0].counts
     assert noise(made_study(0.02, 0.04, (0.03, 0.033), {}), BY_NAME["v_up"]) == 0.0
     assert np.isnan(gain_on(found.rigs[0], AS_IT_IS, BY_NAME["v_down"]))
+
+
+@pytest.mark.parametrize(
+    "own", ["[drive]\nquantised = true\npot_max = 0.6\npot_offset = 0.3", '[run]\nsolver = "fast"']
+)
+def test_a_command_repeats_a_run_of_any_scene(own: str, tmp_path: Path) -> None:
+    """In a folder with a blank, and with what the study sets aside: the firmware's steps, the
+    knobs, the fast solver."""
+    file = tmp_path / "my rig" / "a b.toml"
+    file.parent.mkdir()
+    file.write_text(f'base = "paper-limited"\n{own}\n')
+    scene, settings = load(file), Machine().at(np.array([0.5, 0.6, 0.4]), 0.2, 0.2)
+    base = Bench.base(scene, {}, "test")
+    with Evaluator(base, kept=NEEDED, workers=1) as evaluator:
+        (outcome,) = evaluator.outcomes([settings])
+    value = outcome.numbers["v_average"]
+    smooth = cosim.run("paper-limited", settings | {"run.output_step": 0.01}).summary
+    assert value == pytest.approx(smooth["v_average"], rel=1e-9)
+    line = runs.command([str(file), *runs.sets({"friction.mu_k": 0.65021})], scene, settings)
+    repeats({"command": line, "goal": "v_up", "value": str(value * 1e3)}, tmp_path)
 
 
 @pytest.mark.usefixtures("brief")

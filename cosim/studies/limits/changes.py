@@ -27,6 +27,9 @@ STEPS = firmware.COUNTS - 1
 FREE: Settings = {f"drive.{knob}": None for knob in KNOBS}
 """Removes the knobs from a scene, so that amplitude, frequency and offset can be set directly."""
 
+SMOOTH: Settings = {"drive.pwm_ripple": False, "drive.quantised": False, "run.solver": "fmu"}
+"""What holds on every machine unless it says otherwise: the smooth command, judged by the FMU."""
+
 
 @dataclass(frozen=True)
 class Machine:
@@ -137,7 +140,10 @@ _LIMITS = ("circuit.gain_bandwidth", "circuit.slew_rate")
 CHANGES: Sequence[Change] = (
     AS_IT_IS,
     Change("falling sawtooth", "waveform", _set("drive.waveform", value="falling-sawtooth")),
-    Change("coil's wires exchanged", "waveform", _set("coil.polarity", value=-1)),
+    Change(
+        "coil's wires exchanged", "waveform",
+        lambda scene: Machine({"coil.polarity": -scene.coil.polarity}),
+    ),
     Change("sine", "waveform", _set("drive.waveform", value="sine")),
     Change("square wave", "waveform", _set("drive.waveform", value="square")),
     *(

@@ -15,7 +15,7 @@ from cosim.studies.limits import figures
 from cosim.studies.limits.answer import BY_NAME, ends, gains, noise, percent, sentences
 from cosim.studies.limits.changes import AS_IT_IS, CHANGES, Settings
 from cosim.studies.limits.judge import Point
-from cosim.studies.limits.runs import GOALS, NEEDED, Goal, command
+from cosim.studies.limits.runs import GOALS, NEEDED, Goal, command, sets
 from cosim.studies.limits.study import FULL, QUICK, Study, checked, ensemble, steps, study
 from cosim.studies.report import Progress, Report, Row, counted, silent
 from cosim.studies.study import check_seed
@@ -26,22 +26,22 @@ STORE = "limits.sqlite"
 LEAST_EFFORT, MOST_EFFORT = 0.01, 100.0  # range of the factor ``effort``
 
 
-def report(found: Study, asked: str) -> Report:
-    """The report of a study; ``asked`` are the words that name its scene in ``cosim run``."""
+def report(found: Study, asked: Sequence[str]) -> Report:
+    """The report of a study; ``asked`` are the words that give its scene to ``cosim run``."""
     said, groups = sentences(found), {change.name: change.group for change in CHANGES}
     tables: dict[str, Sequence[Row]] = {
         f"What each change brings: {goal.title} [{goal.unit}]": [*_gains(found, goal)]
         for goal in GOALS
     }
     tables["How the device as it is, and its best shapes, are repeated"] = [
-        {**key._asdict(), "command": f"`{command(asked, point.settings)}`"}
+        {**key._asdict(), "command": f"`{command(asked, found.scene, point.settings)}`"}
         for key, point in found.rigs[0].points.items()
         if groups[key.change] in ("", "waveform") and point.settings
     ]
     rows = [
         {
             **({"rig": number} | key._asdict() | _row(BY_NAME[key.goal], point)),
-            "command": command(asked, rig.settings | point.settings),
+            "command": command(asked, found.scene, rig.settings | point.settings),
         }
         for number, rig in enumerate(found.rigs)
         for key, point in rig.points.items()
@@ -136,10 +136,10 @@ def limits(
         raise BadInput(f"--effort {effort:g}: must be from {LEAST_EFFORT:g} to {MOST_EFFORT:g}.")
     words = [scene.name if isinstance(scene, Scene) else str(scene)]
     base = load(scene, overrides)
-    if overrides:
-        pairs = overrides.items() if isinstance(overrides, Mapping) else ()
-        texts = [f"{key}={value}" for key, value in pairs] or list(overrides)
-        words += [f"--set {text}" for text in texts]
+    if isinstance(overrides, Mapping):
+        words += sets(dict(overrides))
+    elif overrides:
+        words += [word for text in overrides for word in ("--set", text)]
     efforts = (QUICK if quick else FULL).times(effort)
     checked(base)
     others: list[Settings] = ensemble(Path(rigs), base) if rigs is not None else []
@@ -153,4 +153,4 @@ def limits(
         )
 
     asked = inputs(base), others, seed, quick, effort
-    return reported(lambda store: report(found(store), " ".join(words)), out, STORE, *asked)
+    return reported(lambda store: report(found(store), words), out, STORE, *asked)

@@ -1,5 +1,6 @@
 """Runs of a machine: the goals that they score, and the limits of coil and amplifier."""
 
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -13,7 +14,7 @@ from cosim.scene import Scene, changed
 from cosim.scene.tables import KNOBS
 from cosim.search.known import Evaluate, Feasible
 from cosim.search.turns import turned
-from cosim.studies.limits.changes import FREE, Machine, Settings
+from cosim.studies.limits.changes import FREE, SMOOTH, Machine, Settings
 
 SETTLE, SPAN = 0.6, 0.6
 """s, left out of averages and averaged over, at least, where many settings are searched."""
@@ -74,8 +75,7 @@ class Bench:
     @staticmethod
     def base(scene: Scene, rig: Settings, told: str) -> Scene:
         """A scene with its knobs free, on a rig; messages name it ``told``. Raises BadInput."""
-        alone = {"circuit.model": "limited", "drive.pwm_ripple": False, "drive.quantised": False}
-        return changed(scene, FREE | alone | rig, told)
+        return changed(scene, FREE | SMOOTH | {"circuit.model": "limited"} | rig, told)
 
     def outcomes(self, groups: Sequence[Sequence[Settings]]) -> list[list[Outcome]]:
         """The outcomes of groups of settings, all run at once."""
@@ -127,13 +127,19 @@ class Bench:
         return lambda point: machine.at(point, SETTLE, SPAN) | {"run.solver": solver}
 
 
-def command(asked: str, settings: Settings) -> str:
-    """The `cosim run` command that repeats a run; ``asked`` are the words that name its scene."""
+def command(asked: Sequence[str], scene: Scene, settings: Settings) -> str:
+    """The `cosim run` command that repeats a run; ``asked`` are the words that give ``scene``."""
     rows = {"run.output_step": float(settings["run.duration"]) / 2.0}
-    words = (f"--set {key}={_typed(value)}" for key, value in (settings | rows).items())
-    return f"cosim run {asked} {' '.join(words)}"
+    tables = scene.as_dict()
+    told = {key: tables[key.partition(".")[0]][key.partition(".")[2]] for key in SMOOTH}
+    own = {key: value for key, value in SMOOTH.items() if told[key] != value}
+    return shlex.join(["cosim", "run", *asked, *sets(own | settings | rows)])
+
+
+def sets(settings: Settings) -> list[str]:
+    """The options ``--set`` that give these values."""
+    return [word for key, value in settings.items() for word in ("--set", f"{key}={_typed(value)}")]
 
 
 def _typed(value: object) -> str:
-    text = str(value).lower() if isinstance(value, bool) else str(value)
-    return f"'{text}'" if " " in text else text
+    return str(value).lower() if isinstance(value, bool) else str(value)
