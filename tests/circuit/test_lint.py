@@ -275,6 +275,8 @@ MISTAKES = [
     ("Rs s 0 4", "Rs s 0 4\nB1 b 0 V=V(v1) V(out)", ":15: V(v1) V(out) is no expression"),
     ("Rs s 0 4", "Rs s 0 4\nB1 b 0 V=V(v1),2", ":15: the comma in V(v1),2 parts no"),
     ("Rs s 0 4", "Rs s 0 4\nB1 b 0 V=v((s))", ":15: the function v is not defined"),
+    # Read in a time quadratic in the depth: a thousand took 3 s, four thousand 39 s.
+    ("Rs s 0 4", "Rs s 0 {" + 120 * "abs( " + "4" + 120 * " )" + "}", ":14: brackets are nested"),
     # ngspice computes x*23 of the first, and gives up for the rest of the process at the others.
     ("Rs s 0 4", "Rs s 0 4\n.func f(x) {x*2} 3\nR9 s 0 {f(1)}", ":15: {x*2} 3 is no expression"),
     ("Rs s 0 4", "Rs s 0 4\n.func f(x y) {x}", ":15: .func f(x y) {x} is no complete .func"),

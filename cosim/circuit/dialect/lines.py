@@ -8,6 +8,8 @@ from cosim.errors import BadInput, printable
 MAX_LINE = 200_000
 MOST = 50
 """At most so many coefficients of a polynomial, and so many tables or integrals in a line."""
+DEEPEST = 100
+"""Brackets, and calls of the netlist's own functions, within each other."""
 COPY = "; copy its .model line into the netlist"
 
 

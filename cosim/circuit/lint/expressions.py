@@ -9,7 +9,7 @@ from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
 
 from cosim.circuit.dialect.functions import FUNCTIONS
-from cosim.circuit.dialect.lines import Line, refuse, shown
+from cosim.circuit.dialect.lines import DEEPEST, Line, refuse, shown
 from cosim.circuit.dialect.words import (
     TOKEN,
     Definition,
@@ -38,8 +38,8 @@ takes: with too many or too few ngspice calculates something else in silence."""
 BEHAVIOURAL = _COMMON | dict.fromkeys(word_set("ddt eq0 ge0 gt0 le0 lt0 ne0 u u2 uramp"), 1)
 """Functions of ngspice's behavioural sources, except ``pwl``, which takes any number of points.
 Random functions are replaced by a number when ngspice reads the netlist."""
-MOST_CALLS, DEEPEST = 10_000, 100
-"""Limits of the calls that a call expands to, and of their nesting; ngspice 39 takes 0.15 s."""
+MOST_CALLS = 10_000
+"""That a call may expand to, at most ``DEEPEST`` deep; ngspice 39 takes 0.15 s."""
 CONSTANTS = word_set("time temper hertz")
 BEHAVIOURAL_CONSTANTS = word_set("pi e i s")
 _TAKEN = (BEHAVIOURAL_CONSTANTS | frozenset(BEHAVIOURAL)) - {"pi"}

@@ -2,9 +2,10 @@
 
 import re
 from collections.abc import Iterator
+from itertools import accumulate
 from unicodedata import category
 
-from cosim.circuit.dialect.lines import MAX_LINE, Line, refuse, shown
+from cosim.circuit.dialect.lines import DEEPEST, MAX_LINE, Line, refuse, shown
 from cosim.circuit.dialect.translate import in_ngspice
 
 _COMMAND_COMMENT = re.compile(r"\*\s*(?:#\s*[\w!/.]|ng_script)", re.IGNORECASE)
@@ -42,6 +43,9 @@ def checked(data: bytes, name: str) -> str:
 def logical(text: str, file: str, first: int) -> Iterator[Line]:
     """The lines with content, translated to ngspice's dialect."""
     for line in _joined(text, file, first):
+        # What follows looks for the end of each bracket anew, in a time quadratic in the depth.
+        if max(accumulate((char in "({") - (char in ")}") for char in line.text)) > DEEPEST:
+            refuse(line, f"brackets are nested more than {DEEPEST} deep")
         yield from in_ngspice(line)
 
 
