@@ -264,7 +264,7 @@ def test_a_waveform_without_a_setting_costs_only_itself(tmp_path: Path) -> None:
     for name in (*old, "best-mine.toml"):  # of an earlier search, and the user's
         (tmp_path / name).touch()
     over = {"drive.offset": (-1.0, 1.0)}
-    with pytest.warns(Note, match="square: No setting could be run"):
+    with pytest.warns(Note, match="square: No setting could be run; .*above --heat, 3 W"):
         found = tune(
             *("paper-limited", few), maximise="v_average", over=over,
             waveform=["square", "sine"], **given,

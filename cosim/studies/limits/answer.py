@@ -226,8 +226,8 @@ def _warmth(study: Study) -> str:
     lift, ever = map(warmer, rises(coil, DRIVE_RANGE_HEAT))
     current = np.sqrt(DRIVE_RANGE_HEAT / coil.resistance)
     return (
-        f"The coil may make {DRIVE_RANGE_HEAT:.1f} W here, the most of the data sheet's range of "
-        f"drives, (5 V)²/7.1 Ω. That is no rating: it takes {current:.2f} A rms, "
+        f"The coil may make {DRIVE_RANGE_HEAT:.1f} W here, the most of the Carlton's range of "
+        f"drives, (5 V)²/7.1 Ω by its data sheet. That is no rating: it takes {current:.2f} A rms, "
         f"{current / RATED_CURRENT:.1f} times the current that the sheet names. By an estimate the "
         f"winding warms by {lift} in a lift of {LIFT:.0f} s, and by {ever} in continuous use."
     )
@@ -246,6 +246,6 @@ def _search(study: Study) -> str:
         f"Searches of {len(REPEATED)} changes were repeated with other seeds, {len(study.repeats)} "
         f"times in all: nine in ten robust values differ by at most, and in brackets all, {apart}; "
         f"the former is the noise. Of {len(asked)} points the circuit with more in it confirms "
-        f"{held} within 1 %. All measured trials have a rising sawtooth, at 30 Hz at most "
+        f"{held} within 1 %. The paper's trials have a rising sawtooth, at 30 Hz at most "
         "except one at 51 Hz: what other shapes and higher frequencies bring is a prediction."
     )

@@ -306,7 +306,8 @@ class _Trial:
         limit applies to its own only, as an operator who is off turns the knob back."""
         own, most = outcomes[0], self.aim.heat
         if (heat := own.numbers.get("coil_heat", 0.0)) > most:
-            own = replace(own, failure=f"the heat of {heat:.3g} W in a coil is above {most:.3g} W")
+            words = f"the heat of {heat:.3g} W in a coil is above --heat, {most:.3g} W"
+            own = replace(own, failure=words)
             return Run(settings, own, None)
         values = [value for each in outcomes if (value := self._value(each)) is not None]
         if len(values) < len(outcomes):
