@@ -319,7 +319,7 @@ def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         report, "FULL", Efforts((FEW, Effort(0, 3, 2), Effort(0, 0, 0)), (FEW, FEW), 1)
     )
-    scene = load("reference", {"run.duration": 0.2})
+    scene = load("reference", {"run.duration": 0.2, "mechanics.part_mass": 0.01})
     rigs = tmp_path / "rigs.json"
     rigs.write_text('{"ensemble": [{}, {"mechanics.surface_mass": 0.02}]}')
     steps: list[tuple[int, int]] = []

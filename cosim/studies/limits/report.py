@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from math import isfinite, nan
 from pathlib import Path
@@ -10,7 +11,7 @@ from cosim.errors import BadInput
 from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.point import inputs
 from cosim.evaluate.store import Store, reported
-from cosim.scene import Overrides, Scene, load
+from cosim.scene import Overrides, Scene, load, to_link
 from cosim.studies.limits import figures
 from cosim.studies.limits.answer import BY_NAME, ends, gains, noise, percent, sentences
 from cosim.studies.limits.changes import AS_IT_IS, CHANGES, Settings
@@ -134,7 +135,11 @@ def limits(
     check_seed(seed)
     if not LEAST_EFFORT <= effort <= MOST_EFFORT:
         raise BadInput(f"--effort {effort:g}: must be from {LEAST_EFFORT:g} to {MOST_EFFORT:g}.")
-    words = [scene.name if isinstance(scene, Scene) else str(scene)]
+    words = [str(scene)]
+    if isinstance(scene, Scene):
+        words = [scene.name]
+        with suppress(BadInput):  # of a scene that names files
+            words = [to_link(scene)]
     base = load(scene, overrides)
     if isinstance(overrides, Mapping):
         words += sets(dict(overrides))
