@@ -340,7 +340,7 @@ def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     said = study_in(tmp_path)
     study_in(tmp_path / "at once")
     assert steps == [(k, len(steps) // 2) for k in range(1, len(steps) // 2 + 1)] * 2
-    assert "the Carlton's range of drives" in repr(said)
+    assert "the data sheet of the paper's actuator" in repr(said)
     assert "By an estimate the winding warms by" in repr(said)
     assert not (tmp_path / STORE).exists()
     text = (tmp_path / "limits.csv").read_text(encoding="utf-8")

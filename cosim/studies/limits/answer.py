@@ -226,8 +226,9 @@ def _warmth(study: Study) -> str:
     lift, ever = map(warmer, rises(coil, DRIVE_RANGE_HEAT))
     current = np.sqrt(DRIVE_RANGE_HEAT / coil.resistance)
     return (
-        f"The coil may make {DRIVE_RANGE_HEAT:.1f} W here, the most of the Carlton's range of "
-        f"drives, (5 V)²/7.1 Ω by its data sheet. That is no rating: it takes {current:.2f} A rms, "
+        f"The coil may make {DRIVE_RANGE_HEAT:.1f} W here, the most of the drives that the data "
+        "sheet of the paper's actuator names, (5 V)²/7.1 Ω. That is no rating: it takes "
+        f"{current:.2f} A rms, "
         f"{current / RATED_CURRENT:.1f} times the current that the sheet names. By an estimate the "
         f"winding warms by {lift} in a lift of {LIFT:.0f} s, and by {ever} in continuous use."
     )
