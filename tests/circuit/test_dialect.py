@@ -769,6 +769,7 @@ SPELT = {
     "R9 x 0 RM 500\n.model RM RES(R=1 TC1=1e-2)\n.temp 37": 2.2,
     "R9 x 0 RX\nR8 0 x {550*2}\n.model RX R(R=1100)": 2.2,
     "G9 x 0 VALUE={V(x)/(500+5*(TEMP-27))}\n.OPTIONS RELTOL=1E-4 TEMP=37": 2.2,
+    ".param warm=37\nR9 x 0 {temp==warm ? 550 : 1}\n.temp 37": 2.2,
     "X9 x W temp=1100\n.subckt W a PARAMS: temp=1\nR1 a 0 {temp/2}\n.ends": 2.2,
     ".DEFINE R_SET {2*RH}\n.params RH=275\nR9 x 0 {R_SET}\n.wave a.wav 16 44.1k V(x)": 2.2,
     "R9 x 0 550\nC9 x y CM 1n\nL9 y 0 LM 1m\n.model CM CAP(C=1)\n.model LM IND(L=1)": 2.2,

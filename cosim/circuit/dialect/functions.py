@@ -39,7 +39,7 @@ FUNCTIONS = {
 ``pwr`` has the sign of x, ``pow`` never a sign): formal parameters, and the body for ngspice. 1e-99
 keeps the slope of roots finite at 0. The logarithm of a switch's resistance is a cubic of its
 control (Cadence, *PSpice Reference Guide*, voltage-controlled switch)."""
-# A name, and the sign behind it by which it is a function, or is set.
+# A name, and the sign behind it by which it is a function, or set or compared.
 _NAME = re.compile(r"(?<![\w.])([a-z_]\w*+)(?:\s*(\(|=(?!=)))?")
 _CONSTANTS = {"pi": pi, "boltz": 1.380649e-23, "echarge": 1.602176634e-19, "kelvin": -273.15}
 """LTspice's, in J/K, C and degrees Celsius; of ``pi`` B sources know themselves."""
@@ -58,9 +58,11 @@ def prelude(lines: Sequence[Line]) -> list[Line]:
         needs_pi = "{" in text or "'" in text or text.startswith(".param")
         for match in _NAME.finditer(text):
             name, sign = match.groups()
-            if sign == "(" and name in FUNCTIONS:
-                called.setdefault(name, set()).add(len(arguments_of(text, match.end() - 1)[0]))
-            elif sign is None and (name != "pi" or needs_pi):
+            if sign == "(":
+                if name in FUNCTIONS:
+                    count = len(arguments_of(text, match.end() - 1)[0])
+                    called.setdefault(name, set()).add(count)
+            elif (name != "pi" or needs_pi) and (name != "temp" or sign is None):
                 constants.add(name)
     found = [
         f".param {name}({formals})={{{body}}}"

@@ -62,9 +62,8 @@ _DROPPABLE = re.compile(r"\.model ([^\s(]+)|\.param (\w+)\s*\(")
 _CALLED = re.compile(r"(\w+)\s*\(")
 _BROKEN = re.compile(r"(?:^|[bjp])(?:[ej]|$)|[oe][ob]|u")
 """In the first letters of the groups of TOKEN: a missing operand or operator, or what is none."""
-_KEY = re.compile(r"\s*=(?!=)")
-_BODY = re.compile(r"\b[vi]\s*=(?!=)", re.IGNORECASE)
-_NEXT_KEY = re.compile(r"\b[a-z_]\w*\s*(?<![<>=!])=(?!=)", re.IGNORECASE)
+_BODY = re.compile(r"\b[vi]\s*=(?!=)\s*", re.IGNORECASE)
+_NEXT_KEY = re.compile(r"(?<=\s)[a-z_]\w*\s*(?<![<>=!])=(?!=)", re.IGNORECASE)
 _SOURCE = re.compile(r"\b(?:value|vol|cur)\s*=?\s*$", re.IGNORECASE)
 
 
@@ -295,7 +294,7 @@ def used(expression: str) -> Iterator[tuple[str, list[str] | None]]:
     for token in TOKEN.finditer(text):
         if name := token["call"]:
             yield name, arguments_of(text, token.end() - 1)[0]
-        elif token["name"] and not _KEY.match(text, token.end()):
+        elif token["name"]:
             yield token[0], None
 
 
@@ -326,9 +325,9 @@ def _expressions(line: Line, element: Element | None) -> Iterator[tuple[str, boo
         return
     end = 0
     if element is not None and element.kind == "b":
-        # Braces make no difference there, up to the next key.
+        # Braces make no difference there, up to the next key; "=" behind the first name compares.
         start = len(text) - len(body(line))
-        key = _NEXT_KEY.search(unbraced(text), start)
+        key = _NEXT_KEY.search(unbraced(text), start + 1)
         end = key.start() if key else len(text)
         yield text[start:end], True
     place = end
