@@ -75,6 +75,16 @@ def test_times_of_the_source_rise_also_where_a_run_ends_in_a_jump(tmp_path: Path
     assert times == sorted(set(times)) and times[-1] == pytest.approx(0.04, abs=1e-9)
 
 
+def test_the_drive_of_one_of_two_surfaces_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A file has one drive: a player must know by how much the second source lags."""
+    words = ["two-surfaces", "--set", "drive.phase_deg=70", "--set", "run.duration=0.1"]
+    assert main(["run", *words, "--out", str(tmp_path)]) == 0
+    assert main(["export", str(tmp_path), "--as", "codes,pwl"]) == 0
+    assert capsys.readouterr().out.count("of the first surface; the second lags by 70°") == 2
+
+
 def test_a_run_without_a_coil_has_no_command(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

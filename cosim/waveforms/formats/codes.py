@@ -7,7 +7,7 @@ from cosim.drive.command import shape
 from cosim.drive.staircase import Staircase
 from cosim.scene import changed
 from cosim.scene.firmware import nearest_code, volts
-from cosim.waveforms.formats.source import Format, Run, driven
+from cosim.waveforms.formats.source import Format, Run, driven, lagging
 
 
 def write(run: Run, file: BytesIO) -> str:
@@ -27,7 +27,7 @@ def write(run: Run, file: BytesIO) -> str:
         "};\n",
     ]
     file.write("\n".join(header).encode())
-    return f"{len(codes)} codes, {1 / made.period:.6g} Hz"
+    return f"{len(codes)} codes, {1 / made.period:.6g} Hz{lagging(scene)}"
 
 
 FORMAT = Format("codes", "codes.h", "the drive as the firmware's DAC codes", write)

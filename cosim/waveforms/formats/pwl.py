@@ -4,7 +4,7 @@ from io import BytesIO
 
 from cosim.drive.command import command
 from cosim.drive.straights import straights
-from cosim.waveforms.formats.source import Format, Run, driven
+from cosim.waveforms.formats.source import Format, Run, driven, lagging
 
 CHORDS = 256
 """Straight lines in a period of a sine; their error is 5e-5 of the amplitude."""
@@ -27,7 +27,7 @@ def write(run: Run, file: BytesIO) -> str:
     lines = [f"+ {time:.15g} {volts:.9g}" for time, volts in points]
     head = f"* {scene.name}: {scene.drive.waveform}, V1 in V over s"
     file.write("\n".join([head, "Vcommand v1 0 PWL(", *lines, "+ )\n"]).encode())
-    return f"{len(points)} points over {scene.run.duration:g} s"
+    return f"{len(points)} points over {scene.run.duration:g} s{lagging(scene)}"
 
 
 FORMAT = Format("pwl", "command.cir", "the drive as a source of SPICE", write)

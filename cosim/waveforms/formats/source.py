@@ -86,3 +86,9 @@ def driven(run: Run, form: str) -> Scene:
             f'= "{scene.circuit.model}".'
         )
     return scene
+
+
+def lagging(scene: Scene) -> str:
+    """Words that end a line on the first surface's drive where a second one has its own."""
+    lag = scene.drive.phase_deg
+    return "" if lag is None else f", of the first surface; the second lags by {lag:g}°"
