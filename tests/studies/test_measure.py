@@ -327,5 +327,7 @@ def test_the_recommended_measurement_narrows_more_than_others() -> None:
     best = CANDIDATES.index(first)
     others = np.median(np.delete(widths, best, axis=0), axis=0)
     assert ((widths[best] < others) & (held[best] > 0.0)).mean() >= 5 / 6
-    assert held.mean() == pytest.approx(0.9, abs=0.05)
+    # Draws and measurements of one rig hold its truth or miss it together.
+    deviation = sqrt(0.9 * 0.1 / MADE)
+    assert held.mean() == pytest.approx(0.9, abs=2.0 * deviation)
     assert first.name in repr(report(known, len(given), 0, held_currents(SCENE)))
