@@ -171,8 +171,8 @@ FUNCTIONS = [
     (IN_B + "V(v1)>0 ? 1", ":15: V(v1)>0 ? 1 must have a : for each ?"),
     (IN_B + "V(v1)>0 ? 1 : 2 : 3", " must have a : for each ?"),
     (IN_PARAM + "{k ? 2}", ":15: {k ? 2} must have a : for each ?"),
-    (IN_B + "2*(V(v1),5)", ":15: the comma in 2*(V(v1),5) parts no arguments"),
-    (IN_B + "max(1,(1,5))", ":15: the comma in max(1,(1,5)) parts no arguments"),
+    (IN_B + "2*(V(v1),5)", ":15: 2*(V(v1),5) is no expression that ngspice can read: its comma"),
+    (IN_B + "max(1,(1,5))", ":15: max(1,(1,5)) is no expression that ngspice can read: its comma"),
 ]
 
 
@@ -273,7 +273,7 @@ MISTAKES = [
     ("Rs s 0 4", "Rs s 0 4\nB1 b 0 2", ":15: b1 has neither"),
     ("Rs s 0 4", "Rs s 0 4\nB1 b 0 V=V(v1)*", ":15: V(v1)* is no expression"),
     ("Rs s 0 4", "Rs s 0 4\nB1 b 0 V=V(v1) V(out)", ":15: V(v1) V(out) is no expression"),
-    ("Rs s 0 4", "Rs s 0 4\nB1 b 0 V=V(v1),2", ":15: the comma in V(v1),2 parts no"),
+    ("Rs s 0 4", "Rs s 0 4\nB1 b 0 V=V(v1),2", ":15: V(v1),2 is no expression"),
     ("Rs s 0 4", "Rs s 0 4\nB1 b 0 V=v((s))", ":15: the function v is not defined"),
     # Read in a time quadratic in the depth: a thousand took 3 s, four thousand 39 s.
     ("Rs s 0 4", "Rs s 0 {" + 120 * "abs( " + "4" + 120 * " )" + "}", ":14: brackets are nested"),

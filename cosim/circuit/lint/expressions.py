@@ -200,6 +200,7 @@ def _check_operators(line: Line, expression: str) -> None:
     """Refuse commas outside calls, ? without :, and what lacks an operand or an operator."""
     tokens = [token for token in TOKEN.finditer(expression) if token.lastgroup]
     what = shown(expression.strip())
+    broken = f"{what} is no expression that ngspice can read"
     calls = [False]  # whether the brackets around the token are a call's, the innermost last
     for token in tokens:
         if token["begin"]:
@@ -207,12 +208,12 @@ def _check_operators(line: Line, expression: str) -> None:
         elif token["end"] and calls[1:]:
             calls.pop()
         elif token[0] == "," and not calls[-1]:
-            refuse(line, f"the comma in {what} parts no arguments; a number has a decimal point")
+            refuse(line, f"{broken}: its comma parts no arguments; numbers have decimal points")
     texts = [token[0] for token in tokens]
     if texts.count("?") != texts.count(":"):
         refuse(line, f"{what} must have a : for each ?, as in (condition ? yes : no)")
     if tokens and _BROKEN.search("".join(str(token.lastgroup)[0] for token in tokens)):
-        refuse(line, f"{what} is no expression that ngspice can read")
+        refuse(line, broken)
 
 
 def _misused(name: str, arguments: list[str], behavioural: bool | None) -> str | None:
