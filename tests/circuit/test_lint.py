@@ -281,6 +281,11 @@ MISTAKES = [
     ("Rs s 0 4", "Rs s 0 4\n.func f(x) {x*2} 3\nR9 s 0 {f(1)}", ":15: {x*2} 3 is no expression"),
     ("Rs s 0 4", "Rs s 0 4\n.func f(x y) {x}", ":15: .func f(x y) {x} is no complete .func"),
     ("Rs s 0 4", "Rs s 0 4\n.func f(x) x*w\nR9 s 0 {f(1)}", ":15: the parameter w is not"),
+    (
+        "Rs s 0 4",
+        "Rs s 0 4\n.func f(x) {x*w}\nD9 s 0 dd\n.model dd d(is={f(1)})",
+        ":15: the parameter w is not",
+    ),
     ("Rs s 0 4", "Rs s 0 {nope=3 ? 1 : 2}", ":14: the parameter nope is not defined"),
     ("Rs s 0 4", "Rs s 0 4\nB1 b 0 V= nope=3", ":15: the parameter nope is not defined"),
     ("Rs s 0 4", "Rs s 0 {4*/k}", ":14: 4*/k is no expression"),

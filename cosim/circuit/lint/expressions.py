@@ -90,7 +90,10 @@ class Names:
         self.calls: dict[str, int] = {}
         """By a function's name: how many calls ngspice makes of one when it expands it."""
         self.mentioned = {word for s in scopes for e in s.elements for word in [e.model, *e.words]}
-        calls = (text.partition(")")[2] if _DROPPABLE.match(text) else text for text in lines)
+        calls = (
+            text.partition(")")[2] if text.startswith(".param") and _DROPPABLE.match(text) else text
+            for text in lines
+        )
         self.called = {name for text in calls for name in _CALLED.findall(text)}
         growing = True
         while growing:
