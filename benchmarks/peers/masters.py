@@ -1,8 +1,8 @@
 """Peers: other masters run the .ssp that ``cosim fmu ssp`` writes of the machine.
 
 Each needs a process of its own, since ngspice has one circuit in a process. A master that is not
-installed is left out: FMPy comes with cosim; Ecos with ``pip install ecospy``, libcosim with
-``pip install libcosimpy``.
+installed is left out: FMPy comes with cosim; libcosim with ``pip install libcosimpy``; Ecos with
+``pip install ecospy tbb``, and ``LD_LIBRARY_PATH`` naming the environment's ``lib`` with its TBB.
 
     python -m benchmarks.peers.masters MASTER FILE.ssp STEP DURATION
 

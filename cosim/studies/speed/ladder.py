@@ -125,7 +125,7 @@ def ladder(
     """Run scenes on each rung of the circuit in turn: the cost of each, and the error of its
     v_average against the top rung "full" and against "amplifier".
 
-    Each of the report's ``rows`` is a rung of a scene: ``scene``, ``circuit.model``, the CPU time
+    Each of the report's ``rows`` is a rung of a scene: ``scene``, ``circuit.model``, the wall time
     ``computing per simulated second [s]`` with its ``least [s]`` and ``most [s]``,
     ``v_average [mm/s]``, its errors ``off the amplifier [%]`` and ``off the top [%]``, and
     ``peak downward acceleration [m/s²]`` of the surface.
