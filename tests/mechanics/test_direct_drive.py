@@ -42,6 +42,24 @@ def test_linear_phases(sticks: bool):
             assert bench["back_emf"] == pytest.approx(-0.6 * state[1], abs=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("law", "force"),
+    [
+        ({"suspension": 2, "suspension_knee": 5e-4, "suspension_hardening": 4e5}, 4e5 * 5e-4**2),
+        ({"suspension": 2, "suspension_knee": -5e-4, "suspension_hardening": 4e5}, 0.0),
+        ({"suspension": 3, "suspension_repulsion": 0.08, "suspension_distance": 3e-3}, 0.08),
+    ],
+)
+def test_starts_in_equilibrium_with_what_the_suspension_pushes(law: dict[str, float], force: float):
+    # at q = 0: k_f z = −(m_s + m_p) g − F_m(0), and nothing moves
+    with Bench(normal_force=5.0, **law, **TIGHT) as bench:
+        rest = -((SURFACE + PART) * G + force) / 560.0
+        assert bench.get("z_surface", "z_ram") == pytest.approx([rest, rest], rel=1e-14)
+        assert bench["a_surface"] == pytest.approx(0.0, abs=1e-12)
+        bench.run_to(0.01)
+        assert bench["z_surface"] == pytest.approx(rest, rel=1e-12)
+
+
 def test_a_rigid_stop_throws_the_surface_back_and_the_part_slips_on():
     # from rest under F the surface (with the part) reaches the stop at v = √(2 F travel/M)
     force, travel, restitution = 0.5, 1e-3, 0.6

@@ -8,8 +8,11 @@
 double stickslip_rest_height(const Model *m)
 {
     const double ram = m->n.ram_fixed ? 0.0 : m->r.ram_mass;
-    return -(ram + m->r.surface_mass + stickslip_part_mass_per_surface(m)) * m->r.gravity /
-           m->r.flexure_stiffness;
+    const double weight =
+        (ram + m->r.surface_mass + stickslip_part_mass_per_surface(m)) * m->r.gravity;
+    /* A ram on the ground does not hang in the suspension, which may push the surface, too. */
+    const double pushed = m->n.ram_fixed ? suspension_at_rest(m, 0.0) : 0.0;
+    return -(weight + pushed) / m->r.flexure_stiffness;
 }
 
 void stickslip_forces_on_part(const Model *m, const Mode *mode, double tau, double a_surface,

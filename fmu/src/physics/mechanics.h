@@ -58,7 +58,8 @@ double stickslip_energy_stored(const Model *m, const double y[N_ALL]);
 
 /* For one surface, of its own mode and states. */
 
-/* Height of the surface at rest, under the weight of all that it carries, m. */
+/* Height of the surface at rest, under the weight of all that it carries and, with the ram on the
+ * ground, the suspension's force at the centre, m. */
 double stickslip_rest_height(const Model *m);
 /* What the spring of a touched compliant wall holds, J. */
 double stickslip_wall_energy(const Model *m, const Mode *mode, const double y[N_STATES]);
