@@ -46,18 +46,17 @@ class Lagging(Command):
 
 def commands(scene: Scene) -> list[Command]:
     """The commands of a scene's surfaces: one, or two where they move by themselves."""
-    first = command(scene)
     if scene.drive.phase_deg is None:
-        return [first]
-    return [first, Lagging(first, scene.drive.phase_deg / 360.0 * first.period)]
+        return [command(scene)]
+    return [command(scene), command(scene, scene.drive.phase_deg / 360.0)]
 
 
-def command(scene: Scene) -> Command:
-    """The command of a scene with a coil."""
+def command(scene: Scene, lag: float = 0.0) -> Command:
+    """The command of a scene with a coil, later by ``lag`` (periods), but switched on as without."""
     made, drive = shape(scene), scene.drive
-    if drive.start_time or drive.start_phase:
-        lag = drive.start_time - drive.start_phase * made.period
-        made = Lagging(made, lag, drive.start_time)
+    if drive.start_time or drive.start_phase or lag:
+        late = drive.start_time + (lag - drive.start_phase) * made.period
+        made = Lagging(made, late, drive.start_time)
     return WithPwm(made) if drive.pwm_ripple else made
 
 

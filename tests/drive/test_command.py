@@ -518,6 +518,17 @@ def test_a_lagging_command_is_the_other_one_later() -> None:
     assert len(commands(load("reference"))) == 1
 
 
+@pytest.mark.parametrize(("start", "phase"), [(0.0, 0.0), (0.0, 0.1), (0.03, 0.0), (0.03, 0.6)])
+def test_both_commands_are_switched_on_at_once(start: float, phase: float) -> None:
+    """The second is 0 V before, and from then on a quarter of a period behind the first."""
+    keys = [f"drive.start_time={start}", f"drive.start_phase={phase}", "drive.phase_deg=90"]
+    _, second = commands(load("two-surfaces", [*keys, "drive.amplitude=8", "drive.offset=-1.2"]))
+    for t in np.linspace(1e-4, 0.2, 399):
+        cycles = (t - start) * 20.0 + phase - 0.25
+        expected = -1.2 + 8.0 * (cycles % 1.0 - 0.5) if t >= start else 0.0
+        assert second.value(t) == pytest.approx(expected, abs=1e-9)
+
+
 def test_a_staircase_lags_by_a_share_of_its_own_period() -> None:
     staircase_of = ["drive.quantised=true", "drive.phase_deg=180"]
     first, second = commands(load("two-surfaces", staircase_of))
