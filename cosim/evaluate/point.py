@@ -94,7 +94,10 @@ def point(base: Scene, values: Settings, whole_periods: bool) -> Scene:
     few_rows = float(values.get("run.duration", base.run.duration)) / 2.0
     if few_rows != base.run.output_step:
         values = {"run.output_step": few_rows, **values}
-    return moved(base, values, whole_periods)
+    scene = moved(base, values, whole_periods)
+    # Whole periods end elsewhere, and the last row is to be the end, which at_wall is about.
+    own = "run.output_step" in values or not whole_periods
+    return scene if own else scene.having(run={"output_step": scene.run.duration / 2.0})
 
 
 def moved(base: Scene, values: Settings, whole_periods: bool) -> Scene:

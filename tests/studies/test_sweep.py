@@ -106,6 +106,18 @@ def test_frequencies_last_whole_periods() -> None:
     assert abs(broken - known) > 1e-3 * abs(known)
 
 
+def test_the_last_row_of_whole_periods_is_their_end() -> None:
+    """The ram is at its wall there, but not where the scene's own duration ends."""
+    own = {"run.duration": 0.63, "run.settle": 0.11, "drive.amplitude": 8.0}
+    found = sweep("paper-limited", {"drive.frequency": [20.0, 33.0]}, own)
+    whole = own | {"run.duration": 0.7, "drive.frequency": 20.0}
+    waves = simulate(load("paper-limited", whole)).waveforms
+    travel = load("paper-limited").mechanics.travel
+    ram = waves.z_ram - waves.z_surface
+    assert ram.sel(time=0.63, method="nearest") < travel < ram[-1]
+    assert found.at_wall.sel(frequency=20.0) == 1.0
+
+
 def test_durations_are_averaged_over_whole_periods() -> None:
     """Motion that repeats has one mean; over three periods and a fifth it is 17 % off."""
     long = sweep("ideal-current", {"drive.offset": [-0.783]}, {"run.duration": 3.0}, workers=1)
