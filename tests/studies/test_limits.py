@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 import cosim
 from cosim.arrays import Array
@@ -23,8 +24,8 @@ from cosim.evaluate.store import Store
 from cosim.files.picture import Picture
 from cosim.scene import Scene, changed, load
 from cosim.search.turns import TURN, turned
-from cosim.studies.limits import judge, report, runs, search, study
-from cosim.studies.limits.answer import BY_NAME, differences, gain_on, gains, noise
+from cosim.studies.limits import figures, judge, report, runs, search, study
+from cosim.studies.limits.answer import BY_NAME, differences, gain_on, gains, noise, sentences
 from cosim.studies.limits.changes import AS_IT_IS, CHANGES, FREE, STEPS, Machine
 from cosim.studies.limits.judge import Key, Point
 from cosim.studies.limits.report import STORE
@@ -282,6 +283,43 @@ def test_gains_are_paired_on_each_rig() -> None:
     assert not gains(more, BY_NAME["v_up"])[0].counts
     assert noise(made_study(0.02, 0.04, (0.03, 0.033), {}), BY_NAME["v_up"]) == 0.0
     assert np.isnan(gain_on(found.rigs[0], AS_IT_IS, BY_NAME["v_down"]))
+
+
+def words_of(found: Study) -> tuple[str, str]:
+    """All words of a study's figures, and of its sentences."""
+    goal = BY_NAME["v_up"]
+    drawn = [figures.changes(found, goal), figures.settings(found)]
+    shown = (text.get_text() for one in drawn for text in one.findobj(Text))  # pyright: ignore
+    return " ".join(" ".join(shown).split()), " ".join(sentences(found))
+
+
+def test_what_is_said_of_the_papers_trials_is_said_of_their_rig_alone() -> None:
+    """Another machine was not identified, nor tracked; alone it has no range over rigs."""
+    of_paper = made_study(0.02, 0.04, (0.03, 0.033), {})
+    shown, said = words_of(of_paper)
+    assert "on the identified rig" in shown and "All trials that were measured" in shown
+    assert "their range" in shown and "The paper's trials have a rising sawtooth" in said
+    scene = load("paper", {"mechanics.surface_mass": 5.0})
+    shown, said = words_of(replace(of_paper, scene=scene, rigs=of_paper.rigs[:1]))
+    assert not any(word in shown for word in ("identified", "trials", "their range", "cross"))
+    assert "paper's trials" not in said
+
+
+def test_a_title_is_what_the_marks_show() -> None:
+    def titled(*marks: tuple[float, float]) -> str:
+        points = {
+            Key("as it is", "v_up", kind): Point(1.0, 1.0, 1.0, 1.0, *mark, [], {})
+            for kind, mark in zip(("best", "robust"), marks, strict=False)
+        }
+        found = Study(load("paper"), [AS_IT_IS], [Rig({}, points)], [])
+        assert "no robust gain" in words_of(found)[0]
+        nothing = "With the device unchanged no setting was found for a robust mean velocity"
+        assert (nothing in words_of(found)[1]) == (not marks)
+        return figures.settings(found).get_suptitle()
+
+    assert "does not carry the part fastest" in titled((0.01, 90.0), (-0.02, 50.0))
+    assert "carries the part fastest" in titled((0.01, 50.0), (-0.02, 90.0))
+    assert titled() == "No setting was found"
 
 
 @pytest.mark.parametrize(

@@ -84,20 +84,22 @@ def gains(study: Study, goal: Goal) -> list[Gain]:
 
 
 def noise(study: Study, goal: Goal) -> float:
-    """The search's noise: nine in ten robust values of repeated searches differ by at most this."""
-    return float(np.quantile(differences(study, goal), NINE_IN_TEN, method="higher"))
+    """The search's noise: nine in ten robust values of repeated searches differ by at most this;
+    0 where none was repeated."""
+    found = differences(study, goal) or [0.0]
+    return float(np.quantile(found, NINE_IN_TEN, method="higher"))
 
 
 def differences(study: Study, goal: Goal) -> list[float]:
     """Relative differences between the robust values of a repeated and the first search, on all
-    rigs; 0 where no search was repeated."""
+    rigs."""
     found = []
     for number, points in study.repeats:
         for key, point in points.items():
             first = study.rigs[number].points.get(key)
             if first is not None and (key.goal, key.kind) == (goal.name, "robust"):
                 found.append(abs(point.median / first.median - 1.0))
-    return found or [0.0]
+    return found
 
 
 def sentences(study: Study) -> list[str]:
@@ -160,7 +162,9 @@ def _as_it_is(study: Study, goal: Goal) -> str:
     every = [rig.point(AS_IT_IS, goal, "robust") for rig in study.rigs]
     robust, best = every[0], study.rigs[0].point(AS_IT_IS, goal, "best")
     if robust is None or best is None:
-        return ""
+        return f"With the device unchanged no setting was found for a robust {goal.title}."
+    # A short search may find the greatest value where it looks for a robust one.
+    best = max(best, robust, key=lambda point: point.value)
     known = [one.median * goal.scale for one in every if one]
     value, median, worst, single = (
         f"{brief(x * goal.scale)} {goal.unit}"
@@ -239,14 +243,21 @@ def _search(study: Study) -> str:
         f"{goal.name} {100.0 * noise(study, goal):.0f} % "
         f"({100.0 * max(differences(study, goal)):.0f} %)"
         for goal in GOALS
+        if differences(study, goal)
     )
     own = study.rigs[0].points.values()
     asked = [point for point in own if point.rung]
     held = sum(point.confirmed for point in asked)
-    return (
-        f"Searches of {len(REPEATED)} changes were repeated with other seeds, {len(study.repeats)} "
-        f"times in all: nine in ten robust values differ by at most, and in brackets all, {apart}; "
-        f"the former is the noise. Of {len(asked)} points the circuit with more in it confirms "
-        f"{held} within 1 %. The paper's trials have a rising sawtooth, at 30 Hz at most "
-        "except one at 51 Hz: what other shapes and higher frequencies bring is a prediction."
-    )
+    repeated = sum(change.name in REPEATED for change in study.changes)
+    said = [
+        f"Searches of {repeated} changes were repeated with other seeds, {len(study.repeats)} "
+        "times in all: nine in ten robust values differ by at most, and in brackets all, "
+        f"{apart or 'nothing, since none was found'}; the former is the noise.",
+        f"Of {len(asked)} points the circuit with more in it confirms {held} within 1 %.",
+    ]
+    if study.of_trials:
+        said.append(
+            "The paper's trials have a rising sawtooth, at 30 Hz at most except one at 51 Hz: "
+            "what other shapes and higher frequencies bring is a prediction."
+        )
+    return " ".join(said)

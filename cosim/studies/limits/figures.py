@@ -22,15 +22,19 @@ MARKERS = dict(zip(COLORS, "D^svoP", strict=True))
 def changes(study: Study, goal: Goal) -> Picture:
     """A row for each change with its robust gain in %, the largest on top."""
     every = [gain for gain in gains(study, goal) if gain.every]
+    several = len(study.rigs) > 1
+    each = " on each rig that fits the trials" if several else ""
+    over = "median over the rigs" if several else "gain"
+    ends = "; bar: their range; cross: the scene's rig" if several else ""
     note = (
-        "Robust: the median over errors of ±2 % in the knobs, set anew for each change on each rig "
-        "that fits the trials. Dot: the median over the rigs, hollow where it is within "
-        "the noise; bar: their range; cross: the scene's rig; grey band: what nine in ten "
+        f"Robust: the median over errors of ±2 % in the knobs, set anew for each change{each}. "
+        f"Dot: the {over}, hollow where it is within the noise{ends}; grey band: what nine in ten "
         "repeated searches differ by at most. Dark orange changes the waveform, yellow the heat, "
-        "green the grip, blue the circuit, purple coil or magnet. All trials that were measured "
-        "have a rising sawtooth."
+        "green the grip, blue the circuit, purple coil or magnet."
     )
-    said = in_short(every, ranges=False)
+    if study.of_trials:
+        note += " All trials that were measured have a rising sawtooth."
+    said = in_short(every, ranges=False) or ("" if every else "no robust gain could be found")
     title = f"{goal.title.capitalize()}: {said}" if said else goal.title
     figure, (axis,) = panels(title, note, (10.0, 0.27 * len(every) + 1.9))
     scatter = 100.0 * noise(study, goal)
@@ -39,11 +43,12 @@ def changes(study: Study, goal: Goal) -> Picture:
     upwards = every[::-1]
     for row, gain in enumerate(upwards):
         color = COLORS[gain.change.group]
-        ends = 100.0 * np.array([min(gain.every), max(gain.every)])
-        axis.plot(ends, [row, row], color=color, lw=1.6, alpha=0.55)
+        reach = 100.0 * np.array([min(gain.every), max(gain.every)])
+        axis.plot(reach, [row, row], color=color, lw=1.6, alpha=0.55)
         filled = color if gain.counts else "white"
         axis.plot(100.0 * gain.middle, row, "o", color=color, mfc=filled, ms=6, zorder=3)
-        axis.plot(100.0 * gain.own, row, "x", color="0.15", ms=5, zorder=4)
+        if several:
+            axis.plot(100.0 * gain.own, row, "x", color="0.15", ms=5, zorder=4)
     axis.set_yticks(range(len(every)), [gain.change.name for gain in upwards], fontsize=9)
     for label, gain in zip(axis.get_yticklabels(), upwards, strict=True):
         label.set_color(COLORS[gain.change.group])
@@ -55,14 +60,20 @@ def changes(study: Study, goal: Goal) -> Picture:
 
 def settings(study: Study) -> Picture:
     """Acceleration against velocity of every setting that was best or robust for something."""
+    rig = "identified" if study.of_trials else "scene's"
     note = (
         "Each mark: a setting that is the best, or the most robust, for one goal with one change, "
-        "on the identified rig. Lines: accelerations at which a sticking part slips as the surface "
+        f"on the {rig} rig. Lines: accelerations at which a sticking part slips as the surface "
         "falls; the camera's reading is a mean over 4 ms, below the instant that decides."
     )
     points = study.rigs[0].points
     group = {change.name: change.group for change in study.changes}
-    title = "The largest acceleration does not carry the part fastest"
+    title = "No setting was found"
+    if points:
+        strongest = max(points.values(), key=lambda point: point.a_camera)
+        fastest = max(abs(point.v_average) for point in points.values())
+        words = "carries" if abs(strongest.v_average) == fastest else "does not carry"
+        title = f"The largest acceleration {words} the part fastest"
     figure, (axis,) = panels(title, note, (9.0, 5.4))
     for rank, (name, color) in enumerate(COLORS.items()):
         some = [point for key, point in points.items() if group[key.change] == name]

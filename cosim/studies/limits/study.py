@@ -12,7 +12,7 @@ from cosim.errors import BadInput, plain
 from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.store import Store
 from cosim.files.reader import read
-from cosim.scene import Scene, toml
+from cosim.scene import Scene, load, toml
 from cosim.scene.messages import shown
 from cosim.simulation.summary import budget
 from cosim.studies.limits.changes import AS_IT_IS, CHANGES, Change, Settings
@@ -75,6 +75,12 @@ class Study:
     rigs: list[Rig]
     repeats: Sequence[tuple[int, Mapping[Key, Point]]]
     """Repeated searches: the number of a rig, and the points of REPEATED there."""
+
+    @property
+    def of_trials(self) -> bool:
+        """Whether the paper's trials are about the scene's rig: coil and mechanics are theirs."""
+        paper = load("paper")
+        return (self.scene.coil, self.scene.mechanics) == (paper.coil, paper.mechanics)
 
     @property
     def slips(self) -> list[Mapping[str, tuple[float, float]]]:
