@@ -322,6 +322,13 @@ def test_a_title_is_what_the_marks_show() -> None:
     assert titled() == "No setting was found"
 
 
+def test_what_a_device_has_already_is_no_change() -> None:
+    """Else a search by chance would be told as its gain."""
+    base = Bench.base(load("paper", {"circuit.supply": 30.0, "coil.polarity": -1}), {}, "test")
+    names = [change.name for change in CHANGES if not change.acts(base)]
+    assert names == ["as it is", "supply ±30 V"]
+
+
 @pytest.mark.parametrize(
     "own", ["[drive]\nquantised = true\npot_max = 0.6\npot_offset = 0.3", '[run]\nsolver = "fast"']
 )

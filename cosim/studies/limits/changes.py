@@ -1,7 +1,7 @@
 """The changes of the device that are studied, one at a time, and the knobs that are searched."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
 from typing import Any
@@ -98,6 +98,14 @@ class Change:
     searched: bool = True
     """Whether the knobs are searched for this change. If not, the change is only tried at the
     robust settings of the unchanged device, since its runs need ngspice or hardly move these."""
+
+    def acts(self, scene: Scene) -> bool:
+        """Whether it changes anything of a scene's device."""
+        machine = self.machine(scene)
+        split = {key: key.split(".") for key in machine.settings}
+        known = {key: scene.table(table).get(name) for key, (table, name) in split.items()}
+        other = {key: value for key, value in machine.settings.items() if value != known[key]}
+        return replace(machine, settings=other) != Machine()
 
 
 def _set(*keys: str, value: float | str | bool, **more: Any) -> Callable[[Scene], Machine]:

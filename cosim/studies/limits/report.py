@@ -16,7 +16,7 @@ from cosim.studies.limits import figures
 from cosim.studies.limits.answer import BY_NAME, ends, gains, noise, percent, sentences
 from cosim.studies.limits.changes import AS_IT_IS, CHANGES, Settings
 from cosim.studies.limits.judge import Point
-from cosim.studies.limits.runs import GOALS, NEEDED, Goal, command, sets
+from cosim.studies.limits.runs import GOALS, NEEDED, Bench, Goal, command, sets
 from cosim.studies.limits.study import FULL, QUICK, Study, checked, ensemble, steps, study
 from cosim.studies.report import Progress, Report, Row, counted, silent
 from cosim.studies.study import check_seed
@@ -148,13 +148,16 @@ def limits(
     efforts = (QUICK if quick else FULL).times(effort)
     checked(base)
     others: list[Settings] = ensemble(Path(rigs), base) if rigs is not None else []
-    told = counted(progress, steps(efforts, CHANGES, len(others)))
+    # A change to what all rigs have already would be another search of the unchanged device.
+    bases = [Bench.base(base, rig, "a rig") for rig in ({}, *others)]
+    changes = [one for one in CHANGES if one is AS_IT_IS or any(map(one.acts, bases))]
+    told = counted(progress, steps(efforts, changes, len(others)))
 
     def found(store: Store) -> Study:
         return study(
             *(base, others, store),
             lambda rig: Evaluator(rig, kept=NEEDED, workers=workers, dask=dask),
-            *(seed, efforts, CHANGES, told),
+            *(seed, efforts, changes, told),
         )
 
     asked = inputs(base), others, seed, quick, effort
