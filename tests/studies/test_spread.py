@@ -10,7 +10,7 @@ import cosim
 from cosim.cli.main import main
 from cosim.errors import BadInput
 from cosim.scene import firmware, load
-from cosim.studies.tune.spread import turns
+from cosim.studies.tune.spread import Spread, Turned, turns
 
 SHORT = {"run.duration": 0.3, "run.settle": 0.15}
 
@@ -54,6 +54,30 @@ def test_the_ends_are_those_of_runs_of_their_own(
         assert named(told[f"at_{end}"]) == place and f"{place} Hz\n" in printed
         assert f"{told[f'v_average_{end}'] * 1e3:+.3f}" in printed
     assert told["v_average_max"] > 1.3 * told["v_average_min"]
+
+
+def test_turns_are_what_cosim_run_has_there() -> None:
+    """Of motion that has not settled, over the same time: half a period later it is another."""
+    keys = {"drive.frequency": 20.78, "run.duration": 0.6, "friction.mu_plate": 0.0}
+    found = cosim.spread("paper-limited", keys | {"mechanics.n_surfaces": 2})
+    for turned in found.runs:
+        own = cosim.run("paper-limited", keys | {"mechanics.n_surfaces": 2} | turned.settings)
+        assert turned.v_average == pytest.approx(own.summary["v_average"], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "words"),
+    [
+        (1e-3, 2e-3, ("slowest at", "fastest at")),
+        (-2e-3, -1e-3, ("fastest at", "slowest at")),
+        (-2e-3, 1e-3, ("fastest down at", "fastest up at")),
+    ],
+)
+def test_what_is_fast_is_so_either_way(low: float, high: float, words: tuple[str, str]) -> None:
+    runs = [Turned({"drive.offset": value}, "limited", value) for value in (high, low)]
+    printed = repr(Spread(runs)).splitlines()[1:]
+    for line, word, value in zip(printed, words, (low, high), strict=True):
+        assert line.split("drive.offset")[0].strip() == word and f" = {value:g} V" in line
 
 
 def test_where_the_cheap_circuit_is_wrong_all_is_run_on_the_scenes_own():

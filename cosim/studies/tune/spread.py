@@ -71,10 +71,13 @@ class Spread:
     def __repr__(self) -> str:
         """The lines that ``cosim run --spread`` prints."""
         low, high = (_speed(run) * 1e3 for run in (self.least, self.most))
+        ends = "fastest down at", "fastest up at"
+        if low * high >= 0.0:
+            ends = ("slowest at", "fastest at")[:: 1 if low + high >= 0.0 else -1]
         rows = [
             (f"with a knob ±{TURN * 100:g} %", f"{low:+.3f} … {high:+.3f} mm/s"),
-            ("  slowest at", str(self.least)),
-            ("  fastest at", str(self.most)),
+            (f"  {ends[0]}", str(self.least)),
+            (f"  {ends[1]}", str(self.most)),
             *(("  failed at", f"{run}: {run.failure}") for run in self.runs if run.failure),
         ]
         return "\n".join(f"  {name:<24}{value}" for name, value in rows)
@@ -90,11 +93,12 @@ def spread(
 ) -> Spread:
     """Run a scene as it is and with each of the three knobs turned by TURN either way.
 
-    The runs last whole periods, at least as long as the scene's own. Where ngspice solves its
-    circuit, all are first made on a circuit model that needs no ngspice. The scene itself, the
-    slowest and the fastest turn are then run on the scene's own model, and where one of the three
-    differs by more than ``run.tolerance``, all others too. ``workers`` runs at once, by default one
-    for each processor; ``progress`` is given the number of runs done.
+    The runs are those of `cosim run`; where the scene gives run.settle, they last whole periods, at
+    least as long as its own. Where ngspice solves its circuit, all are first made on a circuit
+    model that needs no ngspice. The scene itself, the slowest and the fastest turn are then run on
+    the scene's own model, and where one of the three differs by more than ``run.tolerance``, all
+    others too. ``workers`` runs at once, by default one for each processor; ``progress`` is given
+    the number of runs done.
 
     Of what comes back ``runs`` has each setting's keys and ``v_average``, m/s; ``least`` and
     ``most`` are two of them, and ``summary()`` is what ``summary.json`` gets.
@@ -117,7 +121,9 @@ def spread(
             found[n] = Turned(settings[n], model, value, outcome.failure)
             progress(next(steps))
 
-    with Evaluator(scene, whole_periods=True, workers=workers) as bench:
+    # Without a run.settle of the scene's own each run averages over whole periods by itself.
+    whole = "settle" in scene.run.model_fields_set
+    with Evaluator(scene, whole_periods=whole, workers=workers) as bench:
         run(range(len(settings)), fidelity.simple or {})
         if fidelity.simple is not None:
             simple, known = dict(found), [n for n, turn in found.items() if not turn.failure]
