@@ -10,7 +10,7 @@ from cosim.cli.main import main
 from cosim.evaluate.store import Store
 from cosim.scene import Scene, load
 from cosim.simulation.simulate import simulate
-from cosim.studies.speed.ladder import RUNGS, cheapest, each_rung
+from cosim.studies.speed.ladder import RUNGS, Rung, _on, cheapest, each_rung, report
 
 QUICK = ["run.duration=0.2", "run.settle=0.1"]
 
@@ -47,6 +47,18 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert {path.name for path in tmp_path.iterdir()} == {
         f"ladder.{end}" for end in ("csv", "md", "png")
     }
+
+
+def test_the_command_of_each_rung_is_told_as_it_is() -> None:
+    """A scene whose drive is quantised has the staircase on every rung."""
+    smooth, stairs = (load("reference", {"drive.quantised": own}) for own in (False, True))
+    for scene in (smooth, stairs):
+        assert _on(scene, "limited").drive.quantised == scene.drive.quantised
+        rungs = [Rung(model, (1.0, 1.0, 1.0), 1.0, 1.0, 0.0, 0.0) for model in RUNGS]
+        found = report([(scene, rungs)])
+        notes = " ".join(found.figures[""]().get_supxlabel().split())
+        for said in (repr(found), notes):
+            assert ("but in reference the staircase" in said) == scene.drive.quantised
 
 
 def test_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

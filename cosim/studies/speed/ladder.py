@@ -107,7 +107,7 @@ def _on(scene: Scene, model: str) -> Scene:
 TOP = (
     "The top, full, is the schematic with the data sheet's output stage and, under a sawtooth "
     "without reset_time, the firmware's staircase of codes: what these two make is in every error "
-    "against it. The other rungs follow the smooth command."
+    "against it. The other rungs follow the smooth command"
 )
 
 Found = Sequence[tuple[Scene, list[Rung]]]
@@ -161,11 +161,18 @@ def report(found: Found) -> Report:
         for scene, rungs in found
         for rung in rungs
     ]
-    notes, figures = [f"{message(found)}.", *said, TOP], {"": partial(draw, found)}
+    top = f"{TOP}{_but(found)}."
+    notes, figures = [f"{message(found)}.", *said, top], {"": partial(draw, found)}
     return Report(
         "ladder", "The ladder of circuits", table, notes, {"Each rung": table}, figures,
-        "\n".join([*said, TOP, "", *markdown(table)]),
+        "\n".join([*said, top, "", *markdown(table)]),
     )  # fmt: skip
+
+
+def _but(found: Found) -> str:
+    """Words on the scenes that have the staircase on every rung."""
+    names = " and ".join(scene.name for scene, _ in found if scene.drive.quantised)
+    return names and f", but in {names} the staircase, too (drive.quantised)"
 
 
 def words(scene: Scene, rungs: list[Rung]) -> str:
@@ -188,7 +195,7 @@ def draw(found: Found) -> Picture:
     size = (max(3.8 * wide, 6.0), 3.4 * ceil(len(found) / wide) + 0.6)
     note = (
         "Green: the cheapest rung within run.tolerance, which is shaded. Under a sawtooth “full” "
-        "has the firmware's staircase, the others the smooth ramp."
+        f"has the firmware's staircase, the others the smooth ramp{_but(found)}."
     )
     figure, axes = panels(message(found), note, size, len(found), wide, sharex=True, sharey=True)
     for axis, (scene, rungs) in zip(axes, found, strict=True):
