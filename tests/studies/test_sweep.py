@@ -26,10 +26,11 @@ from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from cosim.studies.sweep import figure
 from cosim.studies.sweep.design import Design, grid, sample
-from cosim.studies.sweep.report import table
+from cosim.studies.sweep.report import of_ports, table
 from cosim.studies.sweep.run import sweep
 from cosim.toolchain.processes import in_place
 from cosim.toolchain.worker import living
+from cosim.waveforms import report
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -370,6 +371,17 @@ def test_no_point_could_be_run(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert main(["sweep", "reference", *over, "--workers", "1", "--out", str(tmp_path)]) == 3
     assert "No point could be run; the first one: --over: " in capsys.readouterr().err
     assert (tmp_path / "sweep.nc").exists()
+
+
+def test_what_ports_join_and_save_keeps_comes_first() -> None:
+    """As in the table of a run, whatever else the FMU has: its gap is no port's."""
+    short = {"run.duration": 0.01, "run.settle": 0.001}
+    data = sweep("relay", {"circuit.reltol": [5e-5]}, short)
+    result = simulate(load("relay", short))
+    printed = report.table(result.scene, result.summary, result.units).splitlines()
+    told = [line.split(" [")[0].strip() for line in printed if " [" in line]
+    ranked = [name for name in of_ports(data) if name.removesuffix(".mean") in told]
+    assert ranked == [f"{name}.mean" for name in told] and len(told) > 8
 
 
 def test_a_figure_of_ones_own_circuit_is_about_the_first_port() -> None:

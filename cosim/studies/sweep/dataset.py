@@ -21,6 +21,7 @@ from cosim.scene.tables import MACHINE
 from cosim.studies.sweep.design import Design
 from cosim.waveforms.columns import netcdf_name, netcdf_names
 from cosim.waveforms.quantities import meaning
+from cosim.waveforms.report import asked_for
 from cosim.waveforms.storage import renamed, swept
 
 FAILURE = "failure"
@@ -80,6 +81,10 @@ def dataset(
     ``units`` are :func:`units_of` the scene.
     """
     numbers = found.by_name()
+    if scene.has_ports:  # what ports join and save keeps is shown first
+        asked = asked_for(scene)
+        first = sorted(numbers, key=lambda name: name.rpartition(".")[0] not in asked)
+        numbers = {name: numbers[name] for name in first}
     axes = _names(design, {*numbers, FAILURE, POINT})
     dims = tuple(axes) if design.sample is None else (POINT,)
     columns = [list(axis.values) for axis in design.axes]

@@ -56,7 +56,7 @@ def table(data: xr.Dataset) -> str:
 
 
 def of_ports(data: xr.Dataset) -> list[str]:
-    """The means of a scene with ports of its own, those of the first ports first."""
+    """The means of a scene with ports of its own, of what ports join and save keeps first."""
     own = "v_average" not in data
     return [name for name in map(str, data) if own and name.endswith(".mean")]
 
