@@ -146,7 +146,8 @@ def drift(time: Array, heights: Array, period: float | None) -> float:
     if not (period and periods):
         return float((heights[-1] - heights[0]) / (time[-1] - time[0]))
     span = periods * period
-    starts = time[time <= time[-1] - span * (1 - 1e-9)]
+    # The first row begins one in any case: ``whole_periods`` rounds up by a millionth.
+    starts = time[time <= max(time[0], time[-1] - span * (1 - 1e-9))]
     gained = np.interp(starts + span, time, heights) - heights[: len(starts)]
     return float(gained.mean() / span)
 

@@ -129,6 +129,14 @@ def test_drift_is_that_of_whole_periods(periods: float, uneven: bool) -> None:
     assert drift(time, z, None) == drift(time, z, 10.0) == pytest.approx(ends)
 
 
+def test_drift_of_a_recording_of_just_one_period() -> None:
+    """A found period may be longer than the recording, within what its search resolves."""
+    time = np.arange(961) / 960.0
+    z = 0.2 * time + 1e-3 * np.sin(2.0 * np.pi * time)
+    for off in (-5e-7, 0.0, 5e-7):
+        assert drift(time, z, 1.0 + off) == pytest.approx(0.2, rel=1e-5)
+
+
 @pytest.mark.parametrize(
     ("number", "frequency", "offset", "force"), [(1, 9.82, 1.0, 0.979), (3, 9.72, 2.6, 0.466)]
 )
