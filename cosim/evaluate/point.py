@@ -91,13 +91,15 @@ def is_fast(base: Scene, values: Settings) -> bool:
 
 def point(base: Scene, values: Settings, whole_periods: bool) -> Scene:
     """The scene of a point. Raises BadInput."""
+    given = "run.output_step" in values
     few_rows = float(values.get("run.duration", base.run.duration)) / 2.0
     if few_rows != base.run.output_step:
         values = {"run.output_step": few_rows, **values}
     scene = moved(base, values, whole_periods)
+    if given or not whole_periods:
+        return scene
     # Whole periods end elsewhere, and the last row is to be the end, which at_wall is about.
-    own = "run.output_step" in values or not whole_periods
-    return scene if own else scene.having(run={"output_step": scene.run.duration / 2.0})
+    return scene.having(run={"output_step": scene.run.duration / 2.0})
 
 
 def moved(base: Scene, values: Settings, whole_periods: bool) -> Scene:
