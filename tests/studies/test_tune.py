@@ -258,6 +258,15 @@ def test_waveforms_are_searched_each_by_itself(tmp_path: Path) -> None:
     assert not list(tmp_path.glob("*.sqlite*"))
 
 
+def test_a_number_that_no_setting_has_is_refused(tmp_path: Path) -> None:
+    """A rigid wall stops the ram at once: the peak of the surface's acceleration is unbounded."""
+    few = {"mechanics.contact": "rigid", "run.duration": 0.1}
+    with pytest.raises(BadInput, match="a_surface_max has no value at any setting"):
+        over = {"drive.amplitude": (4.0, 8.0)}
+        tune("paper-limited", few, maximise="a_surface_max", over=over, budget=24, out=tmp_path)
+    assert not any(tmp_path.iterdir())
+
+
 def test_a_waveform_without_a_setting_costs_only_itself(tmp_path: Path) -> None:
     """Square waves of these volts make more heat than may be."""
     few = {**FAST, "run.settle": 0.05, "run.duration": 0.1}

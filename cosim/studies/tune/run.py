@@ -364,8 +364,11 @@ def _searched(trial: _Trial, budget: int, whole_periods: bool, scouting: Progres
     else:
         trial.search(searched, warm)
     if trial.best is None:
-        first = (trial.runs or ahead)[0]
-        raise SimulationFailed(f"No setting could be run; the first one: {first.outcome.failure}")
+        failures = [run.outcome.failure for run in trial.runs or ahead]
+        if not any(failures):  # as the peak of an acceleration at a rigid wall
+            raise trial.scene.bad(f"{aim.quantity} has no value at any setting that was run.")
+        first = next(filter(None, failures))
+        raise SimulationFailed(f"No setting could be run; the first one: {first}")
     best, neighbours = trial.best, trial.neighbours()
     # A turn that is better becomes the best run; its own turns are run while the budget lasts.
     while trial.best is not best and len(trial.runs) + faces_each <= budget:
