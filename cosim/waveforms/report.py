@@ -20,6 +20,7 @@ def table(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> st
     rows = [
         ("part's mean velocity", _scaled(summary["v_average"], 1e3, "mm/s", "+.3f")),
         ("  off by its own steps", _own_error(summary)),
+        ("  from other starts", _other_starts(summary)),
         ("  averaged over", _periods(scene, summary)),
         ("motion", motion_in_words(summary)),
         ("", of_the_start(scene, summary)),
@@ -173,6 +174,13 @@ def _own_error(summary: dict[str, Any]) -> str:
     """The error of the mean velocity that the run's step sizes may cause (twice its estimate)."""
     error = summary.get("v_average_error")
     return "" if error is None else f"not more than about {2e3 * error:.1g} mm/s"
+
+
+def _other_starts(summary: dict[str, Any]) -> str:
+    """The mean velocities of the same drive begun later; empty where none was run."""
+    found = summary.get("v_average_other_starts") or []
+    words = ", ".join(signed(1e3 * value, "+.3f") for value in found)
+    return f"{words} mm/s" if words else ""
 
 
 def motion_in_words(summary: Mapping[str, Any]) -> str:

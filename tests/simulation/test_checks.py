@@ -229,6 +229,24 @@ def test_the_strict_error_is_from_other_runs_of_the_same_circuit(
     assert len(summary["v_average_other_starts"]) == 3
 
 
+def test_other_starts_are_told_where_the_run_itself_is_told(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """They are on the scene's own circuit. Here it has another answer than from rest, which the
+    kind of motion, found on the circuit limited, does not tell."""
+    keys = {"drive.frequency": 40.0, "drive.amplitude": 6.0, "drive.offset": -1.0}
+    keys |= {"mechanics.contact": "rigid"}
+    sets = [f"--set={key}={value}" for key, value in keys.items()]
+    from cosim.cli.main import main
+
+    assert main(["run", "reference", *sets, "--error", "--out", str(tmp_path)]) == 0
+    (line,) = [x for x in capsys.readouterr().out.splitlines() if "from other starts" in x]
+    told = [float(word) for word in line.split("starts")[1].removesuffix(" mm/s").split(", ")]
+    for value, phase in zip(told, (0.25, 0.5, 0.75), strict=True):
+        there = simulate(load("reference", keys | {"drive.start_phase": phase})).summary
+        assert value == pytest.approx(1e3 * there["v_average"], abs=1e-3)
+
+
 def test_a_mean_that_reads_the_start_is_told_with_the_settled_one() -> None:
     """Flexures that ring for seconds: a run of 32 s has what one of 1 s is told to come to."""
     settings = {"drive.quantised": False, "drive.frequency": 45.0, "drive.amplitude": 10.0}
