@@ -52,7 +52,7 @@ def commands(scene: Scene) -> list[Command]:
 
 
 def command(scene: Scene, lag: float = 0.0) -> Command:
-    """The command of a scene with a coil, later by ``lag`` (periods), but switched on as without."""
+    """The command of a scene with a coil, later by ``lag`` (periods) but switched on as without."""
     made, drive = shape(scene), scene.drive
     if drive.start_time or drive.start_phase or lag:
         late = drive.start_time + (lag - drive.start_phase) * made.period
