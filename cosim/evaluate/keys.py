@@ -46,13 +46,15 @@ def split(options: Sequence[str], form: str) -> Iterator[tuple[str, str, str]]:
 
 
 def refuse_unknown(scene: Scene, names: Iterable[str]) -> None:
-    """Raise BadInput where one of the keys ``table.key`` is no ``.param`` of the scene's netlist,
-    or no parameter of its FMUs, or says what another one says."""
+    """Raise BadInput where one of the keys ``table.key`` is no level of the drive's table, no
+    ``.param`` of the scene's netlist or no parameter of its FMUs, or says what another one says."""
     names = [*names]
     for knob, name in KNOBS.items():  # else each run would fail by itself
         both = f"drive.{knob}", f"drive.{name}"
         if set(both) <= set(names):
             raise BadInput(f"--over: {said_twice(*both)}.")
+    levels = [name for name in names if LEVEL_KEY.fullmatch(name.removeprefix("drive."))]
+    changed(scene, dict.fromkeys(levels, 0.0), "--over")
     own = [name for name in names if name.startswith(("circuit.param.", "fmu."))]
     if not own:
         return

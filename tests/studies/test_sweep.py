@@ -317,6 +317,7 @@ BAD = [
         "drive.pot_offset and drive.offset say the same thing twice",
     ),
     (["--over", "circuit.param.x=1,2"], "circuit.param.x: moves nothing with circuit.model ="),
+    (["--over", "drive.table.9=0,0.5"], "drive.table.9 needs a number, and a drive.table with"),
     (["--over", "coil.polarity=0,1"], "0 must be one of -1, 1"),
     (["--over", "drive.offset=1,2", "--samples", "0"], "--samples 0"),
     (["--over", "drive.offset=1", "--samples", "5"], "needs a range"),
