@@ -20,8 +20,10 @@ def write(run: Run, file: BytesIO) -> str:
     points = [(0.0, 0.0)]
     for edges, start, end in straights([command(scene)], scene.run.duration, CHORDS):
         for k, (first, last) in enumerate(zip(start[:, 0], end[:, 0], strict=True)):
-            # A line that ends within the jump before it, as a run may, is that jump.
-            if abs(first - points[-1][1]) > 1e-9 and edges[k] + EDGE < edges[k + 1]:
+            # The last line of a run may end within the jump before it, by rounding at once.
+            if edges[k + 1] - edges[k] <= EDGE:
+                continue
+            if abs(first - points[-1][1]) > 1e-9:
                 points.append((edges[k] + EDGE, first))
             points.append((edges[k + 1], last))
     lines = [f"+ {time:.15g} {volts:.9g}" for time, volts in points]
