@@ -91,6 +91,25 @@ def test_a_netlist_with_names_of_its_own_is_the_same_circuit(folder: Path) -> No
     assert result.summary["energy_residual"] < 1e-4
 
 
+@pytest.mark.parametrize("method", ["step-locked", "redo", "macro-steps"])
+def test_two_coils_are_one_behind_twice_the_resistances(method: str, tmp_path: Path) -> None:
+    """In parallel each takes half of the current, whatever couples them to the netlist."""
+    settings = f'[coupling]\nmethod = "{method}"\nmacro_step = 2e-5\n[run]\nduration = 0.05\n'
+    z = []
+    for count in (1, 2):
+        before, coil, shunt = 2 / count, 7.1 / count, 0.6 / count
+        (tmp_path / "own.cir").write_text(
+            f"t\nVin in 0 0\nEgain e 0 in 0 1.5\nRo e hot {before}\nRc hot c1 {coil}\n"
+            f"Lc c1 c2 {1.2e-3 / count}\nVmot c2 shunt 0\nRs shunt 0 {shunt}\n.end\n"
+        )
+        own = UNSAVED.replace('"paper"', '"reference"') + f"[coil]\ncount = {count}\n" + settings
+        (tmp_path / "own.toml").write_text(own)
+        with in_place():
+            columns = cosim.run(tmp_path / "own.toml").columns
+        z.append(columns["machine.z_ram" if "machine.z_ram" in columns else "z_ram"])
+    np.testing.assert_allclose(z[1], z[0], rtol=0, atol=1e-4 * np.ptp(z[0]))
+
+
 def test_what_is_saved_of_it_is_in_the_waveforms(folder: Path) -> None:
     (folder / "own.toml").write_text(OWN + ENDS + RUN)
     with in_place():

@@ -187,6 +187,10 @@ class Plan:
         origin = Origin(scale=port.scale, offset=port.offset)
         if port.probe is not None:
             origin.kind, origin.place = PROBE, self.words.index(port.probe)
+            if self.scene.renamed and port.to == MACHINE_ENDS[2]:
+                # Of all coils, as where the machine is none of the FMUs; its input is of one.
+                origin.scale /= self.scene.coil.count
+                origin.offset /= self.scene.coil.count
             return origin, unit(port.probe), None, None
         if port.origin == "drive":
             origin.kind = DRIVE
