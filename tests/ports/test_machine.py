@@ -110,6 +110,24 @@ def test_two_coils_are_one_behind_twice_the_resistances(method: str, tmp_path: P
     np.testing.assert_allclose(z[1], z[0], rtol=0, atol=1e-4 * np.ptp(z[0]))
 
 
+@pytest.mark.parametrize("method", ["redo", "macro-steps"])
+def test_a_machine_at_rest_waits_for_its_drive(method: str, tmp_path: Path) -> None:
+    """What rounding makes of its back-EMF there tells nothing of its slope; later it moves as one
+    whose drive begins at once."""
+    (tmp_path / "own.cir").write_text(
+        "t\nVin in 0 0\nEgain hot 0 in 0 2\nRc hot c1 7.1\nLc c1 c2 1.2m\nVmot c2 0 0\n.end\n"
+    )
+    (tmp_path / "own.toml").write_text(UNSAVED.replace('"paper"', '"reference"'))
+    moved = {}
+    for start in (0.0, 0.01):
+        given = {"drive.start_time": start, "run.duration": 0.02 + start, "run.settle": 0.0}
+        given |= {"coupling.method": method, "coupling.macro_step": 2e-5}
+        with in_place():
+            columns = cosim.run(tmp_path / "own.toml", given).columns
+        moved[start] = columns["machine.z_ram"][columns["time"] >= start - 1e-9]
+    assert moved[0.01] == pytest.approx(moved[0.0], abs=1e-4 * np.ptp(moved[0.0]))
+
+
 def test_what_is_saved_of_it_is_in_the_waveforms(folder: Path) -> None:
     (folder / "own.toml").write_text(OWN + ENDS + RUN)
     with in_place():

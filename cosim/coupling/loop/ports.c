@@ -53,9 +53,10 @@ static const double OTHER = 0.1, ROUNDING = 1e-9;
 /* Of a step's change and of the value: by how much an output of the same step is another one. And of
    a step's length: by how much one that ngspice has taken is another than was asked for. */
 
-static const double NOISE = 1e-3, FAR = 0.3;
+static const double NOISE = 1e-3, AT_REST = 1e-12, FAR = 0.3;
 /* Of an output's largest value: a change that tells of its slope, as what rings faster than the steps
-   does not, a ram in its wall, say; of that: how far from it a slope is wrong. */
+   does not, a ram in its wall, say; in the output's unit: what rounding makes of what is at rest; of
+   a change: how far from it a slope is wrong. */
 
 enum { WRONG = 12, RIGHT = 4 }; /* so many wrong changes tell; so many of them a right one outweighs */
 
@@ -420,7 +421,7 @@ static void judge_slopes(Ports *c, double h)
         t->change += value - c->before[t->place];
         t->least += fmin(start, end);
         t->most += fmax(start, end);
-        if (!(fabs(t->change) > NOISE * t->largest))
+        if (!(fabs(t->change) > fmax(NOISE * t->largest, AT_REST)))
             continue;
         const double off = fmax(t->change - t->most, t->least - t->change);
         t->wrong += off > FAR * fabs(t->change) ? 1 : -RIGHT;
