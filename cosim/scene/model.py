@@ -180,6 +180,13 @@ class Scene(BaseModel):
         if method not in OF_PORTS:
             known = ", ".join(f'"{name}"' for name in OF_PORTS)
             raise fault(f'coupling.method = "{method}" must be one of {known} with [[fmu]]')
+        force, ends = f"{MACHINE}.normal_force", [str(port.to or port.origin) for port in self.port]
+        joined = any(end.startswith(f"{MACHINE}.") for end in ends)
+        if self.friction.normal_force_file and joined and force not in ends:
+            raise fault(
+                "as one of the FMUs the machine has a constant friction.normal_force, not that of "
+                f'friction.normal_force_file: leave it out, or feed "{force}" by a [[port]]'
+            )
         names = [MACHINE, *(fmu.name for fmu in self.fmu)]
         for name in names:
             if names.count(name) > 1 or name == "drive":

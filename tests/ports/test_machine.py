@@ -9,7 +9,7 @@ import pytest
 
 import cosim
 from cosim.cli.main import main
-from cosim.errors import BeyondModel
+from cosim.errors import BadInput, BeyondModel
 from cosim.files.resources import circuits
 from cosim.toolchain.processes import in_place
 from tests.ports.foreign import build
@@ -126,6 +126,18 @@ def test_a_machine_at_rest_waits_for_its_drive(method: str, tmp_path: Path) -> N
             columns = cosim.run(tmp_path / "own.toml", given).columns
         moved[start] = columns["machine.z_ram"][columns["time"] >= start - 1e-9]
     assert moved[0.01] == pytest.approx(moved[0.0], abs=1e-4 * np.ptp(moved[0.0]))
+
+
+@pytest.mark.parametrize("method", ["redo", "macro-steps"])
+def test_a_normal_force_from_a_file_is_refused_where_it_would_be_left_out(
+    folder: Path, method: str
+) -> None:
+    (folder / "own.toml").write_text(UNSAVED + RUN + f'[coupling]\nmethod = "{method}"\n')
+    (folder / "force.csv").write_text("time [s],normal_force [N]\n0,0.5\n1,0.9\n")
+    given = {"friction.normal_force_file": str(folder / "force.csv")}
+    with pytest.raises(BadInput, match=r'friction\.normal_force_file.*"machine\.normal_force"'):
+        cosim.load(folder / "own.toml", given)
+    cosim.load(folder / "own.toml", {**given, "coupling.method": "step-locked"})
 
 
 def test_what_is_saved_of_it_is_in_the_waveforms(folder: Path) -> None:
