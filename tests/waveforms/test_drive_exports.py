@@ -84,6 +84,19 @@ def test_times_of_the_source_rise_also_where_a_run_ends_in_a_jump(
     assert times == sorted(set(times)) and times[-1] == pytest.approx(end, abs=1e-9)
 
 
+def test_the_ripple_that_a_source_leaves_out_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Half a volt at V1: the source has the mean of the offset pin."""
+    words = ["reference", "--set", "circuit.model=full", "--set", "run.duration=0.04"]
+    for ripple in ("false", "true"):
+        ripples = ["--set", f"drive.pwm_ripple={ripple}", "--out", str(tmp_path)]
+        assert main(["run", *words, *ripples]) == 0
+        assert main(["export", str(tmp_path), "--as", "pwl"]) == 0
+        told = "without the ripple of drive.pwm_ripple" in capsys.readouterr().out
+        assert told == (ripple == "true")
+
+
 def test_the_drive_of_one_of_two_surfaces_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -15,7 +15,8 @@ EDGE = 1e-9
 
 def write(run: Run, file: BytesIO) -> str:
     """``Vcommand v1 0 PWL(…)`` for ``.include`` in ngspice and LTspice: V1, at the nodes of the
-    netlists' own source. A jump lasts 1 ns, and a period of a sine is 256 straight lines."""
+    netlists' own source. A jump lasts 1 ns, and a period of a sine is 256 straight lines. The
+    offset pin has its mean: the ripple of ``drive.pwm_ripple`` is left out."""
     scene = driven(run, "pwl")
     points = [(0.0, 0.0)]
     for edges, start, end in straights([command(scene)], scene.run.duration, CHORDS):
@@ -29,7 +30,8 @@ def write(run: Run, file: BytesIO) -> str:
     lines = [f"+ {time:.15g} {volts:.9g}" for time, volts in points]
     head = f"* {scene.name}: {scene.drive.waveform}, V1 in V over s"
     file.write("\n".join([head, "Vcommand v1 0 PWL(", *lines, "+ )\n"]).encode())
-    return f"{len(points)} points over {scene.run.duration:g} s{lagging(scene)}"
+    ripple = ", without the ripple of drive.pwm_ripple" if scene.drive.pwm_ripple else ""
+    return f"{len(points)} points over {scene.run.duration:g} s{ripple}{lagging(scene)}"
 
 
 FORMAT = Format("pwl", "command.cir", "the drive as a source of SPICE", write)
