@@ -146,6 +146,20 @@ def test_steps_shorter_than_the_times_digits_tell_nothing_of_the_coil(home: Path
         simulate(load("paper-limited", changes))
 
 
+def test_steps_that_miss_a_staircases_jumps_tell_nothing_of_the_coil(home: Path) -> None:
+    """The package's own schematic as a user's, at the tolerance that switched circuits may need."""
+    for library in circuits().glob("*.lib"):
+        (home / library.name).write_text(library.read_text(encoding="utf-8"), encoding="utf-8")
+    text, path = (circuits() / "full.cir").read_text(encoding="utf-8"), home / "mine.cir"
+    path.write_text(text, encoding="utf-8")
+    changes = ["circuit.model=file", f"circuit.netlist={path}", "drive.quantised=true"]
+    changes += ["circuit.reltol=1e-4", "run.duration=0.1", "run.settle=0.05"]
+    assert simulate(load("reference", changes)).summary["v_average"]
+    path.write_text(text.replace("{coil_inductance/count}", "1.3m"), encoding="utf-8")
+    with pytest.raises(BadInput, match=r"that of \[coil\] 7\.1 Ohm and 1\.2 mH"):
+        simulate(load("reference", changes))
+
+
 def test_noise_of_short_steps_tells_nothing_of_the_coil() -> None:
     """Behind each edge of a PWM ngspice takes steps of 1e-11 s, in which a current has an error of
     1e-6: its sum over steps is right, that of its squares is not."""
