@@ -54,7 +54,8 @@ def refuse_unknown(scene: Scene, names: Iterable[str]) -> None:
         if set(both) <= set(names):
             raise BadInput(f"--over: {said_twice(*both)}.")
     levels = [name for name in names if LEVEL_KEY.fullmatch(name.removeprefix("drive."))]
-    changed(scene, dict.fromkeys(levels, 0.0), "--over")
+    if levels:
+        changed(scene, dict.fromkeys(levels, 0.0), "--over")
     own = [name for name in names if name.startswith(("circuit.param.", "fmu."))]
     if not own:
         return

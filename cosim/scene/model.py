@@ -454,6 +454,11 @@ class Scene(BaseModel):
         changed = {name: getattr(self, name).model_copy(update=own) for name, own in tables.items()}
         return self.model_copy(update=changed)
 
+    def value(self, key: str) -> Any:
+        """The value of a ``table.key`` in :meth:`as_dict`; None where it has none."""
+        table, _, name = key.partition(".")
+        return self.table(table).get(name)
+
     def table(self, name: str) -> Any:
         """One of the tables of :meth:`as_dict`."""
         if name in PORT_LISTS:

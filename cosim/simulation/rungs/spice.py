@@ -195,10 +195,11 @@ def _refuse_foreign_coil(scene: Scene, log: dict[str, Array]) -> None:
     for slopes, flux, whole in _fluxes(scene, log):
         moved += np.abs(slopes).sum(axis=1)
         # Residuals are summed: in single steps of a stiff circuit the equation is inexact.
-        sums = missing + np.cumsum(flux - found @ slopes)
+        residuals = flux - found @ slopes
+        sums = missing + np.cumsum(residuals)
         missing, worst = float(sums[-1]), max(worst, float(np.abs(sums).max()))
         swept += float(whole.sum())
-        scatter += float(np.abs(flux - found @ slopes).sum())
+        scatter += float(np.abs(residuals).sum())
     ends = {"out": "v(out)", "sense": "v(sense)", "back_emf": "Vemf"}
     out, sense, emf = (scene.renamed.get(f"machine.{k}", word) for k, word in ends.items())
     if worst > 0.01 * swept + 1e-12 or (found < 0.0).any():

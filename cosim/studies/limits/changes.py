@@ -102,9 +102,7 @@ class Change:
     def acts(self, scene: Scene) -> bool:
         """Whether it changes anything of a scene's device."""
         machine = self.machine(scene)
-        split = {key: key.split(".") for key in machine.settings}
-        known = {key: scene.table(table).get(name) for key, (table, name) in split.items()}
-        other = {key: value for key, value in machine.settings.items() if value != known[key]}
+        other = {key: x for key, x in machine.settings.items() if x != scene.value(key)}
         return replace(machine, settings=other) != Machine()
 
 
@@ -116,8 +114,7 @@ def _times(factor: float, *keys: str, **more: Any) -> Callable[[Scene], Machine]
     """The values of keys, where the scene has them, times a factor."""
 
     def machine(scene: Scene) -> Machine:
-        split = (key.split(".") for key in keys)
-        known = {f"{table}.{name}": scene.table(table).get(name) for table, name in split}
+        known = {key: scene.value(key) for key in keys}
         scaled = {key: factor * value for key, value in known.items() if value is not None}
         return Machine(scaled, **more)
 

@@ -130,9 +130,7 @@ class Bench:
 def command(asked: Sequence[str], scene: Scene, settings: Settings) -> str:
     """The `cosim run` command that repeats a run; ``asked`` are the words that give ``scene``."""
     rows = {"run.output_step": float(settings["run.duration"]) / 2.0}
-    tables = scene.as_dict()
-    told = {key: tables[key.partition(".")[0]][key.partition(".")[2]] for key in SMOOTH}
-    own = {key: value for key, value in SMOOTH.items() if told[key] != value}
+    own = {key: value for key, value in SMOOTH.items() if scene.value(key) != value}
     return shlex.join(["cosim", "run", *asked, *sets(own | settings | rows)])
 
 

@@ -259,10 +259,8 @@ def ensemble(path: Path, scene: Scene) -> list[Settings]:
 
 def _is_own(scene: Scene, rig: Settings) -> bool:
     """Whether all values of a rig are those of the scene: words equal, numbers within ALIKE."""
-    known = scene.as_dict()
     for key, value in rig.items():
-        table, _, name = key.partition(".")
-        own = known.get(table, {}).get(name)
+        own = scene.value(key)
         if isinstance(own, str) or not isinstance(value, int | float) or not own:
             if own != value:
                 return False

@@ -135,9 +135,7 @@ def drawn(
 def whole(scene: Scene, rigs: Sequence[Settings]) -> list[Settings]:
     """The scene's own rig, then the others, all completed to the same keys by scene values."""
     names = dict.fromkeys(key for rig in rigs for key in rig)
-    split = {key: key.partition(".") for key in names}
-    own = {key: scene.table(table).get(name) for key, (table, _, name) in split.items()}
-    own = {key: value for key, value in own.items() if value is not None}
+    own = {key: value for key in names if (value := scene.value(key)) is not None}
     return [own, *({**own, **rig} for rig in rigs)]
 
 
