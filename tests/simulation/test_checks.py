@@ -82,6 +82,18 @@ def test_on_a_border_between_two_motions_the_told_error_spans_both() -> None:
     assert within_twice_the_told(found["v_average"], found["v_average_error"], 10.5937e-3)
 
 
+def test_it_does_not_depend_on_the_length_of_a_run() -> None:
+    """Motion repeats from 0.35 s on. The other run is as long as the shortest of these three, and
+    ends before the others do."""
+    told = {}
+    for duration in (0.75, 1.3, 2.0):
+        times = {"run.settle": 0.35, "run.duration": duration}
+        found = cosim.run("reference", {"circuit.model": "full", **times}).summary
+        told[duration] = found["v_average_error"]
+    assert told[1.3] == pytest.approx(told[0.75], rel=1e-3)
+    assert told[2.0] == pytest.approx(told[0.75], rel=1e-3)
+
+
 @pytest.mark.parametrize("name", ["direct-drive", "reference"])
 def test_it_holds_with_the_longest_steps_that_there_may_be(name: str) -> None:
     """With 3.5 times as long ones cut to these, too, -14.07 for -15.13 mm/s was told as exact."""
