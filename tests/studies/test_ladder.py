@@ -67,3 +67,11 @@ def test_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     said = capsys.readouterr().err
     assert 'scene held: circuit.model = "none"' in said and said.count("\n") == 1
     assert not out.exists()
+
+
+def test_a_scene_that_no_rung_of_ngspice_can_have_is_told_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["chart", "ladder", "two-surfaces", "--out", str(tmp_path)]) == 2
+    assert "The ladder runs each of ideal, limited, amplifier, full" in capsys.readouterr().err
+    assert not [*tmp_path.iterdir()]

@@ -100,7 +100,10 @@ def _on(scene: Scene, model: str) -> Scene:
     settings: dict[str, Any] = {"circuit.model": model, "drive.pwm_ripple": False}
     if staircase and not scene.drive.reset_time:
         settings["drive.quantised"] = True
-    run = in_whole_periods(changed(scene, settings, scene.origin))
+    try:
+        run = in_whole_periods(changed(scene, settings, scene.origin))
+    except BadInput as error:
+        raise BadInput(f"The ladder runs each of {', '.join(RUNGS)}. {error}") from error
     return run.having(run={"output_step": run.run.duration / 2.0})
 
 
