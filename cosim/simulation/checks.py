@@ -363,10 +363,12 @@ def _repeated(scene: Scene, kind: Mapping[str, Any]) -> tuple[int, int] | None:
     of the scene's own: the first BRIEF periods in which the motion repeats. None where there are no
     such rows."""
     run, length = scene.run, scene.period
-    settled = kind.get("motion_settled", math.inf) - 1e-9 * length  # it may be rounded up
-    if settled > run.settle or run.average != "ends" or length < ROWS * run.output_step:
+    if "motion_settled" not in kind or run.average != "ends" or length < ROWS * run.output_step:
         return None
     count = kind["motion_periods"]
+    settled = kind["motion_settled"] - 1e-9 * length  # it is rounded
+    if settled > run.settle:
+        return None
     periods = math.ceil(BRIEF / count) * count
     first = max(0, math.ceil(settled / run.output_step))
     last = first + round(periods * length / run.output_step)
