@@ -24,6 +24,7 @@ from cosim.mechanics.package import unpacked, zipped
 from cosim.mechanics.stickslip import parameters
 from cosim.scene import Scene
 from cosim.scene.firmware import GAIN
+from cosim.scene.rungs import RUNGS
 
 _FALL = 1e-9
 """s; duration of a jump of the drive, which must be above 0 in a PWL source."""
@@ -42,10 +43,11 @@ _SHOWN = {"z_surface": "m", "z_part": "m", "v_part": "m/s", "friction_force": "N
 def ssp(scene: Scene, target: Path, fmi: int = 2) -> None:
     """Write the .ssp of a scene's machine. Raises BadInput where it has no circuit in ngspice, or
     inputs that an .ssp cannot hold."""
-    if scene.has_ports or not scene.rung.ngspice:
+    able = [name for name, rung in RUNGS.items() if rung.ngspice and not rung.automatic]
+    if scene.has_ports or scene.circuit.model not in able:
         raise BadInput(
             f"{scene.origin}: an .ssp is of the built-in machine with a circuit in ngspice: "
-            'circuit.model must be "amplifier", "full" or "file", without an [[fmu]].'
+            f"circuit.model must be one of {', '.join(able)}, without an [[fmu]]."
         )
     if scene.renamed or scene.coupling.method == "companion":
         raise BadInput(

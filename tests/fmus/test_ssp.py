@@ -133,3 +133,14 @@ def test_what_cannot_be_one_is_told(
     assert main(["fmu", "ssp", *scene.split(), "--out", str(tmp_path / "a" / "x.ssp")]) == 2
     assert said in capsys.readouterr().err
     assert not (tmp_path / "a").exists()
+
+
+@pytest.mark.parametrize("model", ["ideal", "auto"])
+def test_a_scene_without_a_netlist_of_its_own_is_refused(
+    model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """auto, too, which takes a rung only as it runs."""
+    target = tmp_path / "machine.ssp"
+    asked = ["fmu", "ssp", "reference", f"--set=circuit.model={model}", "--out", str(target)]
+    assert main(asked) == 2 and not target.exists()
+    assert "circuit.model must be one of full, amplifier, file, " in capsys.readouterr().err
