@@ -86,7 +86,13 @@ _ALL = (
 )
 
 RUNGS = {rung.name: rung for rung in _ALL}
-"""Every rung by its name; the order is that in which messages list them."""
+"""Every rung by its name, in the order in which messages list them: of the ladder from its top."""
+
+LADDER = tuple(
+    name for name in reversed(RUNGS) if RUNGS[name].on_ladder and not RUNGS[name].automatic
+)
+"""The rungs that studies compare, cheapest first; "full" alone has the data sheet's output stage
+and the firmware's staircase."""
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,9 @@ import pytest
 from cosim.cli.main import main
 from cosim.evaluate.store import Store
 from cosim.scene import Scene, load
+from cosim.scene.rungs import LADDER
 from cosim.simulation.simulate import simulate
-from cosim.studies.speed.ladder import RUNGS, Rung, _on, cheapest, each_rung, report
+from cosim.studies.speed.ladder import Rung, _on, cheapest, each_rung, report
 
 QUICK = ["run.duration=0.2", "run.settle=0.1"]
 
@@ -26,7 +27,7 @@ def on(model: str, *changes: str) -> Any:
 def test_ladder() -> None:
     scene = load("reference", [*QUICK, "run.tolerance=0.2"])
     rungs = each_rung(scene, Store(None))
-    assert [rung.model for rung in rungs] == list(RUNGS)
+    assert [rung.model for rung in rungs] == list(LADDER)
     for rung in rungs[:3]:
         assert rung.v_average == pytest.approx(on(rung.model, *QUICK)["v_average"], rel=1e-9)
     top = rungs[-1].v_average
@@ -43,7 +44,7 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     said = capsys.readouterr().out
     assert "within 0.01 of the top the cheapest rung is" in said and "staircase of codes" in said
     with open(tmp_path / "ladder.csv", encoding="utf-8", newline="") as file:
-        assert [row["circuit.model"] for row in csv.DictReader(file)] == list(RUNGS)
+        assert [row["circuit.model"] for row in csv.DictReader(file)] == list(LADDER)
     assert {path.name for path in tmp_path.iterdir()} == {
         f"ladder.{end}" for end in ("csv", "md", "png")
     }
@@ -54,7 +55,7 @@ def test_the_command_of_each_rung_is_told_as_it_is() -> None:
     smooth, stairs = (load("reference", {"drive.quantised": own}) for own in (False, True))
     for scene in (smooth, stairs):
         assert _on(scene, "limited").drive.quantised == scene.drive.quantised
-        rungs = [Rung(model, (1.0, 1.0, 1.0), 1.0, 1.0, 0.0, 0.0) for model in RUNGS]
+        rungs = [Rung(model, (1.0, 1.0, 1.0), 1.0, 1.0, 0.0, 0.0) for model in LADDER]
         found = report([(scene, rungs)])
         notes = " ".join(found.figures[""]().get_supxlabel().split())
         for said in (repr(found), notes):

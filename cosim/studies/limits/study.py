@@ -14,6 +14,7 @@ from cosim.evaluate.store import Store
 from cosim.files.reader import read
 from cosim.scene import Scene, load, toml
 from cosim.scene.messages import shown
+from cosim.scene.rungs import RUNGS
 from cosim.simulation.summary import budget
 from cosim.studies.limits.changes import AS_IT_IS, CHANGES, Change, Settings
 from cosim.studies.limits.judge import Key, Point, confirmed, judged, tried
@@ -274,7 +275,7 @@ def checked(scene: Scene) -> None:
     if not scene.rung.on_ladder:
         raise scene.bad(
             f'circuit.model = "{scene.circuit.model}" has no limits to change; '
-            'it must be "full", "amplifier", "limited", "ideal" or "auto".'
+            f"it must be one of {', '.join(name for name in RUNGS if RUNGS[name].on_ladder)}."
         )
     if scene.drive.waveform != "sawtooth":
         words = f'drive.waveform = "{scene.drive.waveform}" has no knobs to search.'

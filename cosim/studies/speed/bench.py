@@ -19,6 +19,7 @@ from typing import Any
 
 from cosim.files.atomic import write_json
 from cosim.scene import load
+from cosim.scene.rungs import LADDER
 from cosim.simulation.simulate import simulate
 from cosim.studies.report import Row, machine, markdown
 from cosim.toolchain.libraries import compiled
@@ -90,18 +91,15 @@ def compiler_version() -> str:
 def real_time(rounds: int) -> dict[str, Any]:
     """Simulated seconds per CPU second of whole runs of each rung, and their ratios."""
     scenes = {
-        "full": load("reference", BRIEF_FULL),
-        "amplifier": load("reference"),
-        "ideal": load("reference", ["circuit.model=ideal"]),
-        "part": load("optimal", LONG_PART),
-        "limited": load("reference", ["circuit.model=limited"]),
-    }
+        model: load("reference", BRIEF_FULL if model == "full" else {"circuit.model": model})
+        for model in reversed(LADDER)
+    } | {"part": load("optimal", LONG_PART)}
     taken = take_turns({name: partial(simulate, scene) for name, scene in scenes.items()}, rounds)
     speeds = {
         name: [scene.run.duration / seconds for seconds in taken[name]]
         for name, scene in scenes.items()
     }
-    others = ("full", "limited", "ideal")
+    others = [model for model in LADDER if model != "amplifier"]
     return {
         "real_time": {name: spread(found) for name, found in speeds.items()},
         "over_amplifier": {name: ratios(speeds[name], speeds["amplifier"]) for name in others},

@@ -14,16 +14,14 @@ from cosim.evaluate.point import in_whole_periods
 from cosim.evaluate.store import Store, hashed, reported
 from cosim.files.picture import Picture
 from cosim.scene import Overrides, Scene, changed, load
+from cosim.scene.rungs import LADDER
 from cosim.simulation.fidelity import relative_error
 from cosim.simulation.simulate import simulate
 from cosim.studies.plots import GREEN, panels
 from cosim.studies.report import Progress, Report, brief, counted, markdown, silent
 from cosim.typed import typed
 
-RUNGS = ("ideal", "limited", "amplifier", "full")
-"""Cheapest first; only "full" has the data sheet's output stage and the firmware's staircase."""
-
-RUNS = [(model, k) for k in range(3) for model in RUNGS if not (k and model == "full")]
+RUNS = [(model, k) for k in range(3) for model in LADDER if not (k and model == "full")]
 """Runs of each scene, in order: model and repetition; three for the median cost, one of "full"."""
 
 
@@ -49,8 +47,8 @@ def each_rung(
 
     Averages are over whole periods; few rows are written, so that output adds no cost.
     """
-    runs = {model: _on(scene, model) for model in RUNGS}
-    spent: dict[str, list[float]] = {model: [] for model in RUNGS}
+    runs = {model: _on(scene, model) for model in LADDER}
+    spent: dict[str, list[float]] = {model: [] for model in LADDER}
     numbers: dict[str, dict[str, Any]] = {}
     own = hashed(scene.as_dict())
     simulate(runs["limited"])  # builds and loads libraries, which would count for the first run
@@ -93,7 +91,7 @@ def _on(scene: Scene, model: str) -> Scene:
     if not scene.rung.on_ladder:
         raise scene.bad(
             f'circuit.model = "{scene.circuit.model}" is no rung of the '
-            f"ladder; it must be one of {', '.join(RUNGS)} or auto."
+            f"ladder; it must be one of {', '.join(LADDER)} or auto."
         )
     # The command of "full" is the firmware's staircase; the other rungs follow its smooth ramp.
     staircase = model == "full" and scene.drive.waveform == "sawtooth"
@@ -103,7 +101,7 @@ def _on(scene: Scene, model: str) -> Scene:
     try:
         run = in_whole_periods(changed(scene, settings, scene.origin))
     except BadInput as error:
-        raise BadInput(f"The ladder runs each of {', '.join(RUNGS)}. {error}") from error
+        raise BadInput(f"The ladder runs each of {', '.join(LADDER)}. {error}") from error
     return run.having(run={"output_step": run.run.duration / 2.0})
 
 
