@@ -61,7 +61,7 @@ _FAST_NEEDS: list[tuple[str, Sequence[object], str]] = [
     ("drive.waveform", COMMANDS, "one that drives a coil"),
     ("drive.quantised", (False,), "false"),
     ("drive.phase_deg", (None,), "absent"),
-    ("mechanics.actuator", RAMS, '"ram"'),
+    ("mechanics.actuator", ("ram",), '"ram"'),
     ("run.average", ("ends",), '"ends"'),
     ("mechanics.contact", ("compliant",), '"compliant"'),
     ("friction.normal_force_file", (None,), "absent"),
@@ -302,7 +302,7 @@ class Scene(BaseModel):
             ("circuit.model", able, " or ".join(f'"{name}"' for name in able)),
             ("coil.count", (1,), "1: each surface has a source of its own"),
             ("mechanics.n_surfaces", (2,), "2"),
-            ("mechanics.actuator", RAMS, '"ram"'),
+            ("mechanics.actuator", RAMS, " or ".join(map(toml_value, RAMS))),
             ("friction.mu_plate", (0.0,), "0"),
         )
 
