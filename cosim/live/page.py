@@ -14,6 +14,7 @@ from cosim.circuit.heat import COPPER, DRIVE_RANGE_HEAT
 from cosim.errors import BadInput, plain
 from cosim.live import rigs
 from cosim.scene import load, to_link
+from cosim.scene.rungs import LADDER, RUNGS
 from cosim.scene.tables import FRAME_RATE
 from cosim.toolchain.threads import Progress
 from cosim.trials.recording import GAP, Recording
@@ -26,7 +27,7 @@ MOST_ROWS = 1_000_000
 """Rows of a record, resampled at its median step."""
 
 CIRCUITS: dict[str, dict[str, Any]] = {
-    model: {"circuit.model": model} for model in ("amplifier", "full")
+    model: {"circuit.model": model} for model in LADDER if RUNGS[model].ngspice
 }
 """Circuits that the server runs with ngspice, by their names on the page: values of a scene's keys,
 and under "port" the ports of a netlist that has any."""
