@@ -40,7 +40,7 @@ def ended_alike() -> Iterator[None]:
     def interrupt(number: int, frame: FrameType | None) -> None:
         nonlocal struck, ours
         repeated, ours = ours, False
-        if repeated and (over or isinstance(sys.exc_info()[1], KeyboardInterrupt)):
+        if repeated and (over or _on_its_way(sys.exc_info()[1])):
             return
         if not (struck or over):
             struck = True
@@ -87,6 +87,13 @@ def ended_alike() -> Iterator[None]:
                     pass
     finally:
         sys.unraisablehook, sys.excepthook = hook, show
+
+
+def _on_its_way(handled: BaseException | None) -> bool:
+    """Whether KeyboardInterrupt is handled, be it that code in its handler handles another one."""
+    while handled is not None and not isinstance(handled, KeyboardInterrupt):
+        handled = handled.__context__
+    return handled is not None
 
 
 def _strike() -> None:

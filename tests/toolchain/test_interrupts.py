@@ -96,7 +96,11 @@ try:
             print("ready", flush=True)
             time.sleep(60.0)
         finally:
-            time.sleep(3.0 * interrupts.AGAIN)
+            time.sleep(1.5 * interrupts.AGAIN)
+            try:
+                {}["lacking"]
+            except KeyError:  # as caches and imports handle it
+                time.sleep(1.5 * interrupts.AGAIN)
             clean = True
 except KeyboardInterrupt:
     assert clean
