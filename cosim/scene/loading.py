@@ -18,7 +18,7 @@ from cosim.files import link, reader
 from cosim.files.resources import circuits, compiled_fmus
 from cosim.scene import messages, toml
 from cosim.scene.describe import ACT_WITH, KEYS
-from cosim.scene.model import Scene, toml_value
+from cosim.scene.model import FITTED, Scene, toml_value
 from cosim.scene.rungs import METHODS
 from cosim.scene.tables import (
     KNOBS,
@@ -73,7 +73,7 @@ def load(source: "Scene | str | os.PathLike[str]", overrides: Overrides | None =
     Raises :class:`BadInput` with a sentence on each of the first things that are wrong.
     """
     if isinstance(source, Scene):
-        layers = [_Layer(source.origin, _given(source))]
+        layers = [_Layer(source.origin, source.as_given())]
     else:
         if not isinstance(source, str | bytes | os.PathLike):
             raise BadInput(f"{messages.shown(source)}: must be a scene, or the name of one.")
@@ -105,11 +105,11 @@ def changed(scene: Scene, values: Mapping[str, float | int | str | None], origin
     # A table that stays the same is not checked again, but the scene as a whole is.
     below = {name: scene.table(name) for name in layer.tables}
     if "run" in below:
-        below["run"] = _run_as_given(scene)
+        below["run"] = scene.as_given()["run"]
     try:
         made = Scene.model_validate(vars(scene) | _merge([_Layer("", below), layer]))
     except ValidationError:
-        made = _checked([_Layer(scene.origin, _given(scene)), layer], origin)
+        made = _checked([_Layer(scene.origin, scene.as_given()), layer], origin)
     return made.of(scene.origin, scene.given)
 
 
@@ -179,23 +179,9 @@ def to_link(scene: Scene) -> str:
 
 
 def _plain_values(scene: Scene) -> dict[str, Any]:
-    """The values by "table.key" of :func:`_given`."""
-    given = _given(scene)
+    """The values by "table.key" of :meth:`Scene.as_given`."""
+    given = scene.as_given()
     return {f"{table}.{key}": value for table in TABLES for key, value in given[table].items()}
-
-
-_FITTED = {"settle", "output_step"}
-"""Keys of [run] whose defaults depend on the drive and the duration."""
-
-
-def _given(scene: Scene) -> dict[str, Any]:
-    """The scene's tables, without those of :data:`_FITTED` that have their defaults."""
-    return scene.as_dict() | {"run": _run_as_given(scene)}
-
-
-def _run_as_given(scene: Scene) -> dict[str, Any]:
-    absent = _FITTED - scene.run.model_fields_set
-    return {key: value for key, value in scene.table("run").items() if key not in absent}
 
 
 def _spelt(value: Any) -> str:
@@ -387,7 +373,7 @@ def _tell_doubts(scene: Scene, layers: list[_Layer]) -> None:
     every = [
         key
         for key in KEYS.values()
-        if key.default is not None and key.name not in _FITTED | _TWINS.get(key.table, {}).keys()
+        if key.default is not None and key.name not in FITTED | _TWINS.get(key.table, {}).keys()
     ]
     silent = [
         layer.builtin or all(key.name in layer.tables.get(key.table, {}) for key in every)

@@ -39,6 +39,9 @@ from cosim.scene.tables import (
 )
 from cosim.stepper.stepper import VARIABLES
 
+FITTED = {"settle", "output_step"}
+"""Keys of [run] whose defaults depend on the drive and the duration."""
+
 CAREFUL = {"max_step": 2e-5, "reltol": 1e-5}
 """Defaults for a user's netlist; s, 1."""
 
@@ -449,6 +452,12 @@ class Scene(BaseModel):
         data |= {table: self.table(table) for table in TABLES}
         return data | {name: self.table(name) for name in PORT_LISTS if getattr(self, name)}
 
+    def as_given(self) -> dict[str, Any]:
+        """:meth:`as_dict` without those of FITTED that have their defaults."""
+        absent = FITTED - self.run.model_fields_set
+        run = {key: value for key, value in self.table("run").items() if key not in absent}
+        return self.as_dict() | {"run": run}
+
     def having(self, **tables: dict[str, Any]) -> "Scene":
         """The scene with other values for keys of some tables, which are not checked."""
         changed = {name: getattr(self, name).model_copy(update=own) for name, own in tables.items()}
@@ -502,11 +511,12 @@ def schema() -> dict[str, Any]:
 def to_toml(scene: Scene, base: str = "", folder: str | os.PathLike[str] | None = None) -> str:
     """The resolved scene as TOML: every key with its unit and meaning; loads to an equal scene.
 
-    A key without a value, or set by a knob, is commented out. With the name of a built-in scene as
-    ``base`` all keys are: the file is then a template. Paths are those from a ``folder`` where it
-    is given, in which the file is to lie, and the files are near (:func:`_near`).
+    A key without a value, set by a knob, or with a default that drive and duration give, is
+    commented out. With the name of a built-in scene as ``base`` all keys are: the file is then a
+    template. Paths are those from a ``folder`` where it is given, in which the file is to lie, and
+    the files are near (:func:`_near`).
     """
-    data = scene.as_dict()
+    data = scene.as_given()
     first = {"base": base} if base else {"name": scene.name}
     first["description"] = scene.description
     lines = [f"{key} = {toml_value(value)}" for key, value in first.items()]

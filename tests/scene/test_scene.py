@@ -370,6 +370,13 @@ def test_another_frequency_moves_only_a_settle_that_was_not_given() -> None:
     assert load(load("paper"), {"run.duration": 0.02}).run.settle == 0.01
 
 
+@pytest.mark.parametrize("change", ["drive.frequency=30.5", "run.duration=0.5"])
+def test_a_written_scene_averages_over_whole_periods_too(change: str, tmp_path: Path) -> None:
+    for own in ([], ["run.settle=0.1"]):
+        there = load(written(tmp_path, to_toml(load("paper", own)), "paper.toml"), [change])
+        assert there.run == load("paper", [*own, change]).run
+
+
 def test_knobs_stand_for_values() -> None:
     scene = load("paper", ["drive.pot_max=0.75", "drive.pot_frequency=0.5", "drive.pot_offset=0.3"])
     # by hand: readings 768, 512 and 307 of 1024; 3.3 V full scale; 15/4.7 of gain
@@ -396,12 +403,16 @@ def test_knob_and_value_replace_each_other_between_layers(tmp_path: Path) -> Non
 
 
 def test_text_is_deterministic_and_complete() -> None:
-    text = to_toml(load("reference"))
+    scene = load("reference")
+    text = to_toml(scene)
     assert text == to_toml(load("reference"))
+    fitted = {"run.settle": scene.run.settle, "run.output_step": scene.run.output_step}
     for key in KEYS.values():
-        assert (f"\n{key.name} = " in text) == (key.default is not None), key.full
+        stands = key.default is not None and key.full not in fitted
+        assert (f"\n{key.name} = " in text) == stands, key.full
         (line,) = (line for line in text.splitlines() if line.endswith(key.text))
-        assert line.startswith((f"{key.name} = ", f"# {key.name} =   # "))
+        shown = fitted.get(key.full, "")
+        assert line.startswith(f"{key.name} = " if stands else f"# {key.name} = {shown}  # ")
         assert key.unit in ("", "1") or f"  # {key.unit}; {key.text}" in line
     assert "\nfrequency = 20.0  # Hz; Frequency; " in text
 
