@@ -141,7 +141,7 @@ static int go_over_to(double number)
     m.edge = corner(number + 1.0);
     m.ended = 0;
     m.holds_until = m.time;
-    if (fmod(number, m.count) != 0.0 || m.marked == MOST_MARKS)
+    if (fmod(number, m.count) != 0.0 || m.time > m.begin + SAME_TIME || m.marked == MOST_MARKS)
         return 0;
     double *mark = marks + m.marked++ * (1 + m.totals.n_reals + m.totals.n_wholes);
     mark[0] = m.time;

@@ -120,3 +120,25 @@ def test_knobs_are_those_of_the_firmware() -> None:
         assert frequency == firmware.knob_frequency(fast)
         assert offset == firmware.knob_offset(pin, amplitude)
         assert tuple(back) == each
+
+
+@needs_node
+def test_marks_are_at_the_begin_of_periods() -> None:
+    """Also where the drive is turned within one: the means on the page are over whole periods."""
+    code = """
+    const setup = setupOf(valuesOf({ scene: "paper-limited", changes: {} }), "paper-limited");
+    const exports = started(new WebAssembly.Module(bytes));
+    const machine = new Machine(exports, DATA.references, setup, 400);
+    const row = new Float64Array(OUTPUT_COUNT), found = [];
+    for (let k = 1; k <= 0.3 * RATE; k++) {
+      machine.next(row, 0);
+      const frequency = given[k];
+      if (frequency) machine.turn({ ...setup.drive, frequency });
+      for (const [time] of machine.marks()) found.push((time - machine.origin) * machine.frequency);
+    }
+    return found;
+    """
+    turned = {str(k): 20.0 + k / 1000 for k in range(3000, 6000, 700)}
+    phases = np.array(run(code, turned))
+    assert len(phases) >= 6
+    np.testing.assert_allclose(phases, np.round(phases), atol=1e-9)
