@@ -157,8 +157,12 @@ def test_page_refuses_them_too() -> None:
         *("#scene=paper&__proto__.x=1", "#scene=paper&drive.waveform=optimal", "#scene=%"),
         *("#scene=paper&constructor=1", "#scene=paper&drive.table=[[0,9]]", "#a=b&scene=paper"),
         "#scene=paper&coil.count=1.5",
+        *(f"#scene=paper&drive.waveform={name}" for name in ("steps", "pieces")),
+        "#scene=paper&drive.reset_time=0.06",  # longer than the period
     ]
     assert all(run(code, bad))
+    table = "&drive.waveform=steps&drive.table=[[0,0.5],[0.5,-0.5]]"
+    assert not any(run(code, [f"#scene=paper{more}" for more in ("", table)]))
 
 
 @pytest.mark.reliability

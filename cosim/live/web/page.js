@@ -61,14 +61,12 @@ function heard(told) {
   while (state.marks.length > 3 && state.marks[1][0] < newest - 1) state.marks.shift();
 }
 
-function fault(text) {
-  $("fault").textContent = text;
-}
+function fault(text) { $("fault").textContent = text; }
 
 // --- what is turned -------------------------------------------------------------------------------
 function take(setting, again) {
   const before = state.setting, values = valuesOf(setting), setup = setupOf(values, setting.scene);
-  if (values["drive.reset_time"] * values["drive.frequency"] >= 1) return fault("drive.reset_time must be below the period.");
+  if (impossible(values)) return fault(impossible(values));
   const was = setupOf(state.values, before.scene);
   Object.assign(state, { setting, values });
   state.others = state.others.filter((other) => other === record);
@@ -215,9 +213,7 @@ async function compare() {
     if (!answer.ok) throw new Error(told.error);
     if (setting !== state.setting) throw new Error("The setting has been turned meanwhile.");
     lay(new Overlay(told, DASHED, NAMED), `${model} (dashed)`, told.v_average);
-  } catch (error) {
-    $("compared").textContent = error.message;
-  }
+  } catch (error) { $("compared").textContent = error.message; }
   $("compare").disabled = false;
 }
 

@@ -5,7 +5,6 @@ const TWINS = { "drive.pot_max": "drive.amplitude", "drive.pot_frequency": "driv
   "drive.pot_offset": "drive.offset" };
 for (const [knob, key] of Object.entries(TWINS)) TWINS[key] = knob;
 const has = (object, name) => Object.prototype.hasOwnProperty.call(object, name);
-
 const refuse = (sentence) => { throw new Error(sentence); };
 
 /* The value that a link's text stands for; throws a sentence. */
@@ -28,6 +27,10 @@ function tableOf(key, text) {
   return fits ? pairs : refuse(`${key} must be 1 to 64 pairs of phase, 0 to 1, and level, -0.5 to 0.5.`);
 }
 
+/* What is wrong with a drive whose keys are right each by itself. */
+const impossible = (v) => (v["drive.reset_time"] * v["drive.frequency"] >= 1 ? "drive.reset_time must be below the period."
+  : ["steps", "pieces"].includes(v["drive.waveform"]) && !v["drive.table"] ? `drive.waveform ${v["drive.waveform"]} needs drive.table.` : "");
+
 /* The setting of a link; throws a sentence. */
 function settingOf(link) {
   const at = link.indexOf("#"), text = at < 0 ? link : link.slice(at + 1);
@@ -49,7 +52,8 @@ function settingOf(link) {
     changes[key] = valueOf(key, value);
     if (has(TWINS, key) && has(changes, TWINS[key])) refuse(`${key} and ${TWINS[key]} say the same thing twice.`);
   }
-  return { scene, changes };
+  const wrong = impossible(valuesOf({ scene, changes }));
+  return wrong ? refuse(wrong) : { scene, changes };
 }
 
 /* The link of a setting: what a run needs to repeat it. */
