@@ -105,6 +105,24 @@ def test_link_of_a_stranger(tab: Any, tmp_path: Path) -> None:
     tab.wait_for_function("() => document.getElementById('fault').textContent.includes('refused')")
 
 
+@pytest.mark.filterwarnings("ignore")
+def test_the_grip_turns_up_from_any_value(tab: Any, tmp_path: Path) -> None:
+    """Also where a scene's is beyond the knob's own end of 2 N; then another scene has that again."""
+    path = tmp_path / "page.html"
+    main(["live", "gripper-169g", "--out", str(path)])
+    own = load("gripper-169g").friction.normal_force
+    assert own > 2.0
+    tab.goto(path.as_uri())
+    for key, expected in (("ArrowUp", own), ("End", own), ("PageDown", own * (1 - 120 / 1023))):
+        tab.press("#knob-grip", key)
+        found = tab.evaluate("() => state.values['friction.normal_force']")
+        assert found == pytest.approx(expected, abs=1e-3)
+    tab.select_option("#scene", "paper")
+    tab.press("#knob-grip", "End")
+    assert tab.evaluate("() => state.values['friction.normal_force']") == 2.0
+    assert not tab.faults
+
+
 @pytest.mark.reliability
 def test_server_answers_its_own_page_alone(server: Server) -> None:
     def asked(path: str, **headers: str) -> int:

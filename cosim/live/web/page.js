@@ -1,7 +1,7 @@
 /* The page: what is turned, who plays it, what is told of it. */
 
 const first = opened();
-const state = { setting: first, values: valuesOf(first), speed: 1, paused: false, generation: 0, marks: [], others: [] };
+const state = { setting: first, values: valuesOf(first), speed: 1, paused: false, generation: 0, marks: [], others: [], grip: 2 };
 const history_ = new History();
 const curves = new Curves($("curves"), (words) => {
   $("measure").replaceChildren();
@@ -68,7 +68,7 @@ function take(setting, again) {
   const before = state.setting, values = valuesOf(setting), setup = setupOf(values, setting.scene);
   if (impossible(values)) return fault(impossible(values));
   const was = setupOf(state.values, before.scene);
-  Object.assign(state, { setting, values });
+  Object.assign(state, { setting, values, grip: again ? 2 : state.grip });
   state.others = state.others.filter((other) => other === record);
   $("compared").textContent = state.others.length ? `${record.name} (dotted)` : "";
   fault("");
@@ -94,12 +94,11 @@ function turnKnob(index, code) {
   set(Object.fromEntries(names.map((name, k) => [`drive.${name}`, codes[k] / (most + 1)])));
 }
 
-const GRIP = 2; // N, the end of the grip's scale
 const pot = (name, unit, index) =>
   ({ name, key: `drive.${name}`, digits: 2, unit, at: (v) => codesOf(v)[index] / 1023, turn: (x) => turnKnob(index, x * 1023) });
 const KNOBS = [pot("amplitude", "V", 0), pot("frequency", "Hz", 1), pot("offset", "V", 2),
-  { name: "grip", key: "friction.normal_force", digits: 3, unit: "N", at: (v) => Math.min(1, v["friction.normal_force"] / GRIP),
-    turn: (x) => set({ "friction.normal_force": Math.round(x * GRIP * 200) / 200 }) }];
+  { name: "grip", key: "friction.normal_force", digits: 3, unit: "N", at: (v) => v["friction.normal_force"] / state.grip,
+    turn: (x) => set({ "friction.normal_force": Math.round(x * state.grip * 1e3) / 1e3 }) }];
 
 function makeKnob(knob) {
   const place = Object.assign(made($("knobs"), "div"), { className: "knob", id: `knob-${knob.name}`, tabIndex: 0 });
@@ -138,6 +137,7 @@ function makeKnob(knob) {
 }
 
 function show() {
+  state.grip = Math.max(state.grip, state.values["friction.normal_force"]); // N, the end of its knob's scale
   for (const knob of KNOBS) knob.show();
   $("scene").value = state.setting.scene;
   $("scene").title = DATA.scenes[state.setting.scene].text;
