@@ -204,11 +204,12 @@ function lay(other, name, velocity) {
 }
 
 async function compare() {
-  const setting = state.setting, model = $("model").value, content = { "Content-Type": "text/plain" };
+  const setting = state.setting, model = $("model").value;
+  const asked = { method: "POST", headers: { "Content-Type": "text/plain" }, body: linkOf(setting) };
   $("compare").disabled = true;
   $("compared").textContent = "ngspice runs …";
   try {
-    const answer = await fetch(`run/${model}`, { method: "POST", headers: content, body: linkOf(setting) });
+    const answer = await fetch(`run/${model}`, asked).catch(() => refuse("Nobody answers: start cosim live again."));
     const told = await answer.json();
     if (!answer.ok) throw new Error(told.error);
     if (setting !== state.setting) throw new Error("The setting has been turned meanwhile.");
