@@ -278,6 +278,40 @@ def test_a_record_is_laid_over(tab: Any, tmp_path: Path) -> None:
     assert not tab.faults and tab.locator("img").count() == 0
 
 
+LAID = """(name) => {
+  $('record').click();
+  const own = (one) => record.points(one, 1, 1, true).length;
+  const heights = record.points('z_part', 1, 1, false).map(([, v]) => v).filter(Number.isFinite);
+  return [record.off(name, history_), own('z_part'), extent(heights)];
+}"""
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("name", ["current", "v_part"])
+def test_a_record_without_the_surface_is_laid_over(tab: Any, tmp_path: Path, name: str) -> None:
+    """A run's own, a quarter of a period late: at its phase, and its part at the surface."""
+    scene = load("paper-limited", {"run.duration": 1.2})
+    late = 0.7 + 0.25 / scene.drive.frequency
+    waves = cosim.run(scene).waveforms.sel(time=slice(late, None, 50))
+    rows = zip(waves.time.values - late, waves[name].values, waves.z_part.values, strict=True)
+    heads = {"current": "current [A]", "v_part": "v_part [m/s],z_part [m]"}
+    trial, path = tmp_path / "own.csv", tmp_path / "page.html"
+    lines = [f"{t},{v},{z if k % 2 else ''}" for k, (t, v, z) in enumerate(rows)]
+    if name == "current":
+        lines = [line.rpartition(",")[0] for line in lines]
+    trial.write_text("\n".join([f"time [s],{heads[name]}", *lines]), encoding="utf-8")
+    assert main(["live", "paper-limited", "--trial", str(trial), "--out", str(path)]) == 0
+    tab.goto(path.as_uri())
+    tab.wait_for_function(RUNS)
+    (off, of), points, (low, high) = tab.evaluate(LAID, {"current": "coil_current"}.get(name, name))
+    assert off < 0.2 * of and points == 0, "there is no surface on which the part would be"
+    if name == "v_part":
+        assert -3e-3 < low < high < 1e-3
+    tab.select_option("#heights", "slip")
+    tab.wait_for_timeout(300)
+    assert not tab.faults
+
+
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("ported", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_an_own_circuit_is_run_by_the_server(tmp_path: Path, ported: bool) -> None:

@@ -49,7 +49,7 @@ class History {
    null where nothing is known. */
 class Overlay {
   constructor(found, dash, names) {
-    Object.assign(this, found, { dash, names, shift: 0, lift: 0 });
+    Object.assign(this, found, { dash, names, shift: 0, lift: 0, rest: 0 });
   }
 
   values(name) {
@@ -66,13 +66,14 @@ class Overlay {
     return (this.values(name) ?? []).flatMap((x, k) => (x === null ? [] : [[x, history.value(row(k), own)]]));
   }
 
-  /* A record's phase and its origin of heights are not known: those at which the surfaces agree best. */
+  /* A record's phase and origin of heights are not known: those at which the surface, else another waveform, agrees best. */
   fit(history) {
+    const name = ["v_surface", "coil_current", "v_part", "command", "coil_voltage"].find((one) => this.values(one));
     const agree = Array.from({ length: 200 }, (_, n) => {
       this.shift = n / 200;
-      return this.pairs("v_surface", history).reduce((all, [x, y]) => all + x * y, 0);
+      return this.pairs(name, history).reduce((all, [x, y]) => all - (x - y) ** 2, 0);
     });
-    this.shift = agree.indexOf(Math.max(...agree)) / 200;
+    Object.assign(this, { shift: agree.indexOf(Math.max(...agree)) / 200, rest: history.value(history.inPeriod(0), Z_SURFACE) });
     this.lift = this.pairs("z_surface", history).reduce((mean, [x, y], _, { length }) => mean + (x - y) / length, 0);
   }
 
@@ -85,14 +86,14 @@ class Overlay {
   /* Points of the last periods: share of the window, and value. */
   points(name, factor, periods, onSurface) {
     const values = this.values(name), { z_part: part, z_surface: surface } = this.waveforms;
-    if (!values) return [];
+    if (!values || (name === "z_part" && onSurface && !surface)) return [];
     const begin = Math.max(0, values.length - Math.round(periods / this.frequency / this.step));
-    const height = name.startsWith("z_") ? this.lift : 0;
-    const travelled = name === "z_part" && surface ? part[begin] - surface[begin] : 0;
+    const known = part?.findIndex((x, k) => k >= begin && x !== null && surface?.[k] !== null); // the part begins at the surface
+    const height = name.startsWith("z_") ? this.lift : 0, travelled = name === "z_part" ? part[known] - (surface?.[known] ?? this.rest) : 0;
     const found = [];
     for (let k = begin, last = 0; k < values.length; k++) {
       const phase = this.phase(k) / periods, share = phase - Math.floor(phase);
-      const on = name === "z_part" && onSurface ? surface[k] - height : 0;
+      const on = name === "z_part" && onSurface ? (surface[k] ?? NaN) - height : 0;
       if (share < last) found.push([share, NaN]);
       found.push([share, values[k] === null ? NaN : factor * (values[k] - height - travelled - on)]);
       last = share;
