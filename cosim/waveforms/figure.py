@@ -280,12 +280,12 @@ def _acceleration(axis: Axes, scene: Scene, time: Array, cut: dict[str, Array]) 
         read = accelerations(heights(cut, "surface", frames, exposure))
         label = f"read from {FRAME_RATE:.0f} frames/s"
         axis.plot(frames * 1e3, read, color="0.2", lw=0.9, marker=".", ms=4, label=label)
-    beyond = ""
+    rigid = scene.mechanics.contact == "rigid" and not scene.surface_is_given
+    beyond = "\nwithout its jumps" if rigid else ""
     if np.abs(axis.dataLim.intervaly).max() > LINEAR:
-        beyond = f"\nlogarithmic beyond {LINEAR:g}"
+        beyond += f"\nlogarithmic beyond {LINEAR:g}"
         axis.set_yscale("symlog", linthresh=LINEAR)
         axis.yaxis.set_major_formatter(_power_of_ten)
     _at_least(axis, 2.0)
     axis.set(ylabel=f"acceleration [m/s²]{beyond}")
-    rigid = scene.mechanics.contact == "rigid" and not scene.surface_is_given
-    _head(axis, "Acceleration of the surface" + (", without its jumps" if rigid else ""))
+    _head(axis, "Acceleration of the surface")

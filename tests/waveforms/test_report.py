@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 from cosim.files.resources import circuits
 from cosim.scene import load
@@ -150,6 +151,20 @@ def test_a_figure_in_which_nothing_moves(still: list[str]) -> None:
         box = axis.yaxis.label.get_window_extent()
         assert box.x0 >= 0.0 and box.x1 <= figure.bbox.x1
         assert axis.yaxis.get_offset_text().get_text() == ""
+
+
+@pytest.mark.parametrize("change", ["mechanics.contact=rigid", "drive.phase_deg=270"])
+def test_no_legend_lies_on_its_title(change: str) -> None:
+    figure = simulate(load("two-surfaces", [*SHORT, change])).plot()
+    figure.png()
+    heads = 0
+    for axis in figure.axes:
+        legend, title = axis.get_legend(), axis.get_title(loc="left")
+        for text in axis.findobj(Text):
+            if legend and title and text.get_text() == title:  # pyright: ignore
+                heads += 1
+                assert not legend.get_window_extent().overlaps(text.get_window_extent()), title
+    assert heads == 6
 
 
 def test_ports_of_which_all_numbers_are_zero() -> None:
