@@ -26,7 +26,7 @@ from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from cosim.studies.sweep import figure
 from cosim.studies.sweep.design import Design, grid, sample
-from cosim.studies.sweep.report import of_ports, table
+from cosim.studies.sweep.report import fastest, of_ports, table
 from cosim.studies.sweep.run import sweep
 from cosim.toolchain.processes import in_place
 from cosim.toolchain.worker import living
@@ -336,6 +336,16 @@ def test_bad_input(
     said = capsys.readouterr().err
     assert words in said and said.count("\n") == 1
     assert not out.exists() or not os.listdir(out)
+
+
+@pytest.mark.parametrize(
+    "velocities, ways",
+    [([0.0, -1e-16], []), ([1e-3, 0.0, 4e-7], ["up"]), ([-1e-3, 1e-16, 1e-3], ["up", "down"])],
+)
+def test_what_stays_is_not_fastest(velocities: list[float], ways: list[str]) -> None:
+    """Neither by rounding, nor where the slowest point of those that go up stays."""
+    found = fastest(xr.Dataset({"v_average": ("point", velocities)}))
+    assert [way for way, _ in found] == ways
 
 
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -25,6 +25,9 @@ MOTIONS = "motion_at_random"
 LEAST = 1e-3
 """m/s; the least reference of a relative error of v_average."""
 
+TOLD = 0.5e-6
+"""m/s; a velocity that is less is printed as 0, and no transport."""
+
 BEYOND = 0.02
 """Relative error of v_average: of a fast sweep the share of points above it is printed."""
 
@@ -36,6 +39,8 @@ def table(data: xr.Dataset) -> str:
     count = data[FAILURE].size
     name = str(data.attrs["title"]).removeprefix("Sweep of ")
     lines = [f"{name}: {count} points, {sum(reasons.values())} failed"]
+    if "v_average" in data and not fastest(data):
+        lines.append("  the part stays at each point that ran")
     for way, place in fastest(data):
         speed, judged = data["v_average"].values.ravel()[place], ""
         if JUDGED in data:
@@ -81,7 +86,8 @@ def fastest(data: xr.Dataset) -> list[tuple[str, np.intp]]:
     if not np.isfinite(v).any():
         return []
     ends = ("up", np.nanargmax(v)), ("down", np.nanargmin(v))
-    return [(way, place) for way, place in ends if (v.ravel()[place] > 0) == (way == "up")]
+    moves = {"up": np.nanmax(v) >= TOLD, "down": np.nanmin(v) <= -TOLD}
+    return [(way, place) for way, place in ends if moves[way]]
 
 
 def check(data: xr.Dataset) -> None:
