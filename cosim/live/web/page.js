@@ -236,9 +236,7 @@ const options = (select, names) => { for (const name of names) made(select, "opt
 function opened() {
   try {
     if (location.hash.length > 1) return settingOf(location.hash);
-  } catch (error) {
-    fault(error.message);
-  }
+  } catch (error) { fault(error.message); }
   return settingOf(DATA.start);
 }
 
