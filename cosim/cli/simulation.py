@@ -89,7 +89,7 @@ def _export_options() -> list[Option]:
 
     known = ", ".join(f"{one.name} ({one.help})" for one in formats().values())
     return [
-        Option("run", "a folder that cosim run or sweep wrote", "DIR", Path),
+        Option("run", "a folder that cosim run or sweep wrote, the last of them", "DIR", Path),
         Option(
             *("--as", f"{known}; of a sweep csv, parquet, mat; repeatable", "FORM,..."),
             parameter="forms",
@@ -101,9 +101,10 @@ def _export_options() -> list[Option]:
 
 def _export(run: Path, forms: list[str], out: Path | None = None) -> None:
     from cosim.waveforms import formats
+    from cosim.waveforms.storage import last_written
 
     folder = out or run
-    if (run / "sweep.nc").exists():
+    if last_written(run, "waveforms.nc", "sweep.nc") == "sweep.nc":
         from cosim.studies.sweep import export
 
         with writable(folder):
@@ -380,7 +381,7 @@ COMMANDS = (
         "write a page to look into results: curves, maps, cursors; one file, to be mailed",
         print_page,
         (
-            Option("results", "what run, sweep, compare or a chart wrote", "DIR|TABLE.csv", Path),
+            Option("results", "what run, sweep, compare, chart wrote last", "DIR|TABLE.csv", Path),
             Option("--out", "where to write (default: show.html beside it)", "FILE.html", Path),
         ),
     ),

@@ -26,7 +26,7 @@ from cosim.scene import load
 from cosim.waveforms import formats
 from cosim.waveforms.quantities import bench_unit, label
 from cosim.waveforms.report import table
-from cosim.waveforms.storage import LARGEST, read_netcdf, read_sweep, swept
+from cosim.waveforms.storage import LARGEST, last_written, read_netcdf, read_sweep, swept
 
 BLOCK = 1 << 15
 BUCKET = 256
@@ -43,8 +43,8 @@ Run = list[Array]
 
 
 def show(results: Path, out: Path | None = None) -> Path:
-    """Write the page of a folder that run, sweep, compare or a chart wrote, or of a chart's table,
-    to ``out``, by default beside them. Raises BadInput."""
+    """Write the page of a folder that run, sweep, compare or a chart wrote (of several the last),
+    or of a chart's table, to ``out``, by default beside them. Raises BadInput."""
     path = out or (results if results.is_dir() else results.parent) / "show.html"
     shown, runs = _read(results)
     given = {"title": results.name, "about": "", "words": "", "pictures": {}, "cloud": None}
@@ -64,7 +64,8 @@ def show(results: Path, out: Path | None = None) -> Path:
 
 def _read(results: Path) -> tuple[dict[str, Any], list[Run]]:
     """The data of the page's script, and the runs whose rows follow it."""
-    if (results / "waveforms.nc").exists():
+    last = last_written(results, "waveforms.nc", "sweep.nc", "compare.json")
+    if last == "waveforms.nc":
         found, scene = formats.read(results), load(results / "scene.toml")
         runs = [[drawable(x, found.units[name]) for name, x in found.waveforms.items()]]
         with _whole_results(results / "summary.json") as summary:
@@ -75,9 +76,9 @@ def _read(results: Path) -> tuple[dict[str, Any], list[Run]]:
         if periods > 2 * PERIODS:
             signals["opens"] = -PERIODS / periods
         return told | {"signals": signals}, runs
-    if (results / "sweep.nc").exists():
+    if last == "sweep.nc":
         return _sweep(results)
-    if (results / "compare.json").exists():
+    if last == "compare.json":
         shown, runs = _comparison(results / "frames.csv")
         rows = DictReader(reader.read(results / "compare.csv", LARGEST).decode().splitlines())
         units = {row.get("name"): row.get("unit") or "" for row in rows}

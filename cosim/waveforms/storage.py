@@ -150,6 +150,12 @@ def _text(value: object) -> str:
     return text
 
 
+def last_written(folder: Path, *names: str) -> str:
+    """Which of the files ``names`` in a folder was written last; empty where there is none."""
+    found = [name for name in names if (folder / name).exists()]
+    return max(found, key=lambda name: (folder / name).stat().st_mtime_ns, default="")
+
+
 def renamed(data: "xr.Dataset", change: Callable[[str], str]) -> "xr.Dataset":
     """A dataset with changed names: scipy reads and writes netCDF's UTF-8 names as Latin-1."""
     return data.rename({name: change(str(name)) for name in {*data.variables, *data.dims}})

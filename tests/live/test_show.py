@@ -219,6 +219,20 @@ def test_columns_of_one_name_in_two_units_are_two(tmp_path: Path) -> None:
 
 
 @pytest.mark.reliability
+def test_of_two_results_in_a_folder_the_last_is_shown_and_exported(tmp_path: Path) -> None:
+    """A sweep's own page was that of the run before it, and a run after a sweep was no run."""
+    short = ["ideal-current", "--set", "run.duration=0.1", "--out", str(tmp_path), "--show"]
+    for more, title, form in (
+        (["run"], "ideal-current", "wav"),
+        (["sweep", "--over", "drive.amplitude=6,8"], "Sweep of ideal-current", "csv"),
+        (["run"], "ideal-current", "wav"),
+    ):
+        assert main([*more, *short]) == 0
+        assert f'"title":"{title}"' in (tmp_path / "show.html").read_text(encoding="utf-8")
+        assert main(["export", str(tmp_path), "--as", form]) == 0
+    assert (tmp_path / "sweep.csv").exists() and (tmp_path / "surface.wav").exists()
+
+
 def test_what_cannot_be_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "empty").mkdir()
     (tmp_path / "two").mkdir()
