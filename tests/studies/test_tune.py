@@ -341,6 +341,19 @@ def test_the_scenes_own_setting_is_run_too() -> None:
     assert made.runs[0].values["drive.offset"] != pytest.approx(-0.783)  # mu_k is beyond its range
 
 
+def test_a_best_value_that_reads_the_start_is_told() -> None:
+    """As a run of these settings tells it: short runs reward a start that lifts the part."""
+    short = {"run.settle": 0.05, "run.duration": 0.2}
+    over = {"drive.frequency": (18.0, 22.0)}
+    found = tune("paper-limited", short, maximise="v_average", over=over, budget=24, workers=1)
+    later = in_whole_periods(found.scene.having(run={"settle": 4.0, "duration": 6.0}))
+    z = simulate(later).waveforms.z_part.sel(time=slice(later.run.settle, None))
+    settled = 1e3 * float((z[-1] - z[0]) / (z.time[-1] - z.time[0]))  # mm/s
+    told = repr(found).partition("reads the start; later it is ")[2]
+    assert float(told.split()[0]) == pytest.approx(settled, rel=3e-3)
+    assert abs(1e3 * found.value - settled) > 0.005 * settled
+
+
 @pytest.mark.parametrize(
     ("words", "why"),
     [

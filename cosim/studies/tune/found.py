@@ -22,7 +22,7 @@ from cosim.studies.plots import headline
 from cosim.studies.report import write_csv
 from cosim.typed import typed
 from cosim.waveforms.quantities import bench_unit, label, meaning, percent, with_unit
-from cosim.waveforms.report import motion_in_words
+from cosim.waveforms.report import motion_in_words, of_the_start
 
 COLORS = ("#1f6fb2", "#d1495b", "#2a9d8f", "#e9a03b", "#8d99ae", "#6a4c93")
 _OF_WAVEFORM = re.compile(rf"best-({'|'.join(COMMANDS)})(-\d+)?")
@@ -254,6 +254,9 @@ class Tuning(Aim):
             lines.append(f"  {words}")
         if words := motion_in_words(self.motion):
             lines.append(f"  motion: {words}")
+        early = of_the_start(self.scene, {**self.best.outcome.numbers, **self.motion})
+        if early and self.quantity == "v_average":
+            lines.append(f"  {early}")
         if self.turned:
             lines.append(
                 f"  values are medians over the keys' turns by {percent(TURN)}, or the worst of "
