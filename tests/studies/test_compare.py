@@ -172,6 +172,24 @@ def test_frequencies_that_differ_are_told(run: cosim.Result, tmp_path: Path) -> 
 # --- scores -------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("ends", [(0, 0), (40, 0), (120, 0), (0, 120), (120, 120)])
+def test_a_camera_that_runs_before_the_drive_or_after_it(
+    ends: tuple[int, int], run: cosim.Result, tmp_path: Path
+) -> None:
+    """Of a run at 20 Hz in frames 1 ms apart: rests of more than a period are told."""
+    time = np.arange(250) / 1000.0
+    z = (np.pad(MM * heights(run, time, body), ends, "edge") for body in ("surface", "part"))
+    times = np.arange(250 + sum(ends)) / 1000.0
+    trial = write(tmp_path / "late.csv", "time [s],surface [mm],part [mm]", times, *z)
+    notes = " ".join(cosim.compare(run, trial).found.notes)
+    told = [f"rests in its {end} 0.1" in notes for end in ("first", "last")]
+    assert told == [rows == 120 for rows in ends] and notes.count("rests") == sum(told)
+    table = np.loadtxt(trial, delimiter=",", skiprows=1)
+    table[table[:, 1] == table[0, 1], 1] = table[table[:, 1] == table[-1, 1], 1] = np.nan
+    write(trial, "time [s],surface [mm],part [mm]", *table.T)
+    assert "rests" not in " ".join(cosim.compare(run, trial).found.notes)  # but was not seen
+
+
 def test_a_known_difference(run: cosim.Result, tmp_path: Path) -> None:
     time = np.arange(300) / FRAME_RATE
     surface, part = (heights(run, time, body) for body in ("surface", "part"))

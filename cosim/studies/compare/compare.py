@@ -40,6 +40,9 @@ APART = 0.05
 """Share of a period by which run and recording may drift apart before a note says so."""
 
 
+STILL = 0.1
+"""A signal of less than this share of its 95 % quantile counts as at rest."""
+
 LITTLE = 0.1
 """R² below which a note says that the run hardly explains a signal, where no hint tells why."""
 
@@ -157,6 +160,8 @@ def measure(
         start = seen.best_start(guide, earliest, max(earliest, min(end - span, earliest + period)))
     simulated = {name: seen.signal(name, start) for name in recording.signals}
     notes += _of_periods(repeats, period, span, row)
+    if guide and period is not None and not own:
+        notes += _at_rest(recording, simulated[guide], guide, period)
     if not own and guide:
         phases = np.linspace(-0.5, 0.5, 0 if aligned or period is None else PHASES)
         starts = start + phases * (period or 0.0)
@@ -190,6 +195,23 @@ def _unexplained(recording: Recording, simulated: Signals) -> Iterator[str]:
                 f"The run hardly explains the recording's {COLUMNS[name].text} (R² {share:.2g}), "
                 "and no unit, sign or exchange of columns is why: is it of this machine and drive, "
                 "and is what is in this column what was to be tracked?"
+            )
+
+
+def _at_rest(recording: Recording, simulated: Array, guide: str, period: float) -> Iterator[str]:
+    """Notes on ends of a recording that rest for more than a ``period``, s, where the run does not:
+    of a camera that runs before the drive is switched on, or after it is switched off."""
+    known = np.isfinite(recording.signals[guide])  # what is missing is not at rest
+    wanted, run = np.abs(recording.signals[guide][known]), np.abs(simulated[known])
+    least = STILL * float(np.quantile(wanted, 0.95))
+    moves = np.flatnonzero(wanted > least)
+    row = float(np.median(np.diff(recording.time)))
+    for end, rows in (("first", slice(moves[0])), ("last", slice(moves[-1] + 1, None))):
+        length = len(wanted[rows]) * row
+        if length > period and np.nanmax(run[rows]) > least:
+            yield (
+                f"The recording's {COLUMNS[guide].text} rests in its {end} {length:.3g} s, where "
+                "the run's does not: leave these rows out, which spoil the scores and the drift."
             )
 
 
