@@ -38,11 +38,12 @@ MADE = {
     "h": ("trial-09", (0.68, 0.6, 0.30, 30.0)),
     "held": ("trial-05", (0.35, 6.0, 0.0)),
     "i": ("trial-05", (0.5, 0.6, 0.25)),
+    "rough": ("trial-09", (0.3, 1.2, 0.45)),
     "ridge": ("trial-08", (0.39, 0.68, 0.27)),
 }
 """Scenes, and where they differ: µ_k, F_n [N], µ_plate, and the frequency of the drive [Hz]."""
 KEYS = ("friction.mu_k", "friction.normal_force", "friction.mu_plate", "drive.frequency")
-TEN = [name for name in MADE if name not in ("held", "i", "ridge")]
+TEN = [name for name in MADE if name not in ("held", "i", "ridge", "rough")]
 
 
 def made(
@@ -162,6 +163,16 @@ def test_intervals_of_few_noisy_frames_are_as_wide_as_they_must_be(tmp_path: Pat
             low, high = found["plate_over_kinetic_90_percent"]
             of_ratio += low <= truth["ratio"] <= high
     assert told >= 8 and held >= 0.8 * told and of_ratio >= 0.8 * told
+
+
+def test_a_plate_that_is_rougher_than_the_search_goes_is_told(tmp_path: Path) -> None:
+    """µ_plate/µ_k is 1.5; it was told as 1.19 … 1.32, which is where the search ends."""
+    truth = made(tmp_path, "rough")
+    fit = cosim.fit(tmp_path)
+    low, high = fit.numbers["plate_over_kinetic_90_percent"]
+    assert high is None and 1.0 < low < truth["ratio"] == pytest.approx(1.5)
+    assert f"µ_plate/µ_k at least {low:.2f}: the search ends there" in repr(fit)
+    fit.save(tmp_path)  # with an interval without an end
 
 
 def test_a_trial_in_which_the_part_never_slips_determines_nothing(tmp_path: Path) -> None:

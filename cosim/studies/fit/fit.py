@@ -20,7 +20,7 @@ from cosim.mechanics import part
 from cosim.studies.fit import figures
 from cosim.studies.fit.forces import Force, read_forces
 from cosim.studies.fit.results import Shown, change, together, told
-from cosim.studies.fit.search import FRICTIONS, Fit, Found, Interval, search
+from cosim.studies.fit.search import FRICTIONS, LARGEST_RATIO, Fit, Found, Interval, search
 from cosim.studies.fit.slides import Slide, noise_of
 from cosim.studies.report import Row, write_csv
 from cosim.trials import published
@@ -161,14 +161,15 @@ def _fitted(
         )
     # Where no trial determines its kinetic friction, none determines the plate's.
     untold = plate and "yes" not in verdicts
-    ratio = law.ratio
+    ratio, at_end = law.ratio, law.ratio.value > LARGEST_RATIO - 1e-9
+    reach = [ratio.low, None if at_end else ratio.high]
     numbers: dict[str, Any] = {
         "parameters": "fitted",
         "mu_k": mu_k,
         "mu_k_given": given is not None,
         "mu_plate": None if untold else ratio.value * mu_k,
         "plate_over_kinetic": None if untold else ratio.value,
-        "plate_over_kinetic_90_percent": [ratio.low, ratio.high] if plate and not untold else None,
+        "plate_over_kinetic_90_percent": reach if plate and not untold else None,
         "profiles": {
             trial.name: {"kinetic_friction_weights": x.tolist(), "loss": y.tolist()}
             for trial, (x, y) in zip(trials, law.profile, strict=True)

@@ -122,10 +122,12 @@ def _shared(numbers: dict[str, Any]) -> list[str]:
     found = [f"µ_k {numbers['mu_k']:.3f} {given}"]
     if "mu_k_90_percent" in numbers:
         found[0] += f" {_interval(numbers['mu_k_90_percent'], '.3f')}"
-    if numbers["plate_over_kinetic_90_percent"]:
-        ends = _interval(numbers["plate_over_kinetic_90_percent"], ".2f")
+    if (ends := numbers["plate_over_kinetic_90_percent"]) and ends[1] is None:
+        words = "the search ends there, and no force above is sure; are units and columns right?"
+        found.append(f"µ_plate/µ_k at least {ends[0]:.2f}: {words}")
+    elif ends:
         found.append(f"µ_plate {numbers['mu_plate']:.3f}")
-        found.append(f"µ_plate/µ_k {numbers['plate_over_kinetic']:.2f} {ends}")
+        found.append(f"µ_plate/µ_k {numbers['plate_over_kinetic']:.2f} {_interval(ends, '.2f')}")
     product = "the tracks tell µ_k F_n; the normal force is that over µ_k"
     return ["; ".join(found), product, headline(numbers)]
 

@@ -24,6 +24,8 @@ FRICTIONS: Interval = (0.3, 60.0)
 """Range of µ_k F_n that is searched, in weights of the part."""
 COARSE, FINE, AROUND = 37, 25, 1.2  # points of the first friction grid, of the second; its factor
 RATIOS, NEAR = np.linspace(0.0, 0.9, 7), np.linspace(-0.12, 0.12, 9)  # µ_p/µ_k: grid, refinement
+MOVES = 3  # at most so many fine grids, each about the likeliest law of the last one
+LARGEST_RATIO = float(RATIOS[-1] + MOVES * NEAR[-1])  # that the search can reach
 FREEDOM = 8.0  # degrees of freedom of Student's distribution
 FEWEST = 5  # with fewer slides no interval is given
 DRAWS = 400  # of the bootstrap
@@ -124,7 +126,7 @@ def search(trials: Sequence[Trial], limits: Sequence[Interval], plate: bool) -> 
     scan = _Scan(slides, coarse, RATIOS if plate else np.zeros(1))
     # Finer grids about the likeliest law, moved and searched again while it lies at an edge.
     around = np.geomspace(1 / AROUND, AROUND, FINE)
-    for _ in range(3):
+    for _ in range(MOVES):
         ratios = np.unique((scan.ratio + NEAR).clip(0.0)) if plate else scan.ratios
         grids = [(x * around).clip(*limit) for x, limit in zip(scan.kinetic, limits, strict=True)]
         scan = _Scan(slides, grids, ratios)
