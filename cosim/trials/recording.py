@@ -89,7 +89,7 @@ def read_recording(path: Path, asked: str = "") -> Recording:
     for body in ("surface", "part"):
         if f"z_{body}" in signals:
             velocity = track(signals | {"time": time}, body).v
-            if f"v_{body}" in signals or np.isfinite(velocity).any():
+            if f"v_{body}" in signals or np.isfinite(velocity).sum() > 1:
                 signals[f"v_{body}"] = velocity
     for name, values in signals.items():
         if np.isfinite(values).sum() < 2:

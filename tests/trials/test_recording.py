@@ -67,6 +67,14 @@ def test_velocities_of_uneven_heights_are_central_differences(tmp_path: Path) ->
     np.testing.assert_allclose(v[1:-1], 3.0)  # mm/ms
 
 
+def test_heights_with_a_single_velocity_are_heights_alone(tmp_path: Path) -> None:
+    """Of a part seen in three rows in turn, and then in every third: a KeyError ended it."""
+    seen = np.where((ROWS < 3) | (ROWS % 3 == 2), 1.0 * ROWS**2, np.nan)
+    found = read_recording(write(tmp_path / "a.csv", "time [s],part [mm]", ROWS, seen))
+    assert set(found.signals) == {"z_part"}
+    np.testing.assert_allclose(found.signals["z_part"], 1e-3 * seen)
+
+
 def test_what_is_taken_for_granted_is_told(tmp_path: Path) -> None:
     found = read_recording(write(tmp_path / "a.csv", "velocity [m/s]", ROWS))
     np.testing.assert_allclose(found.time, ROWS / 960)
