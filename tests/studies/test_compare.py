@@ -11,11 +11,11 @@ import pytest
 
 import cosim
 from cosim.cli.main import main
-from cosim.studies.compare.scores import explained
+from cosim.studies.compare.scores import both_sides, explained
 from cosim.trials import camera
 from cosim.trials.camera import FRAME_RATE, frame_times, hermite, velocities
 from cosim.trials.periods import drift, one_period_later, period_of
-from cosim.trials.recording import read_recording
+from cosim.trials.recording import Recording, read_recording
 
 Array = npt.NDArray[np.float64]
 MM = 1e3
@@ -257,6 +257,18 @@ def test_a_forecast_is_what_was_a_period_ago() -> None:
     values = np.array([1.0, np.nan, 3.0, 4.0, 5.0])
     found = one_period_later(time, values, 0.3, gained=0.5)
     np.testing.assert_allclose(found, [np.nan, np.nan, np.nan, 1.5, 4.5])
+
+
+def test_a_kick_is_not_what_a_gap_hides() -> None:
+    """A sine of 0.2 m/s at 20 Hz changes by at most 2 A sin(π f Δt) = 25 mm/s in 1 ms. Over
+    a gap of half a period, 25 ms, it changed by 400 mm/s, which were told as the kick."""
+    time = np.delete(np.arange(300) / 1000.0, np.arange(1, 25))
+    v = {"v_surface": -0.2 * np.cos(2 * np.pi * 20.0 * time)}
+    found = both_sides(Recording("sine", time, v, ()), v, (0.05, 0.05))
+    kick = next(number for number in found if number.name == "kick")
+    largest = 0.4 * np.sin(np.pi * 20.0 / 1000.0)
+    assert kick.values == pytest.approx({"measured": largest, "simulated": largest}, rel=1e-3)
+    assert "velocity in 1 ms:" in kick.meaning
 
 
 def test_r2() -> None:
