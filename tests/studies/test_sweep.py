@@ -348,6 +348,16 @@ def test_what_stays_is_not_fastest(velocities: list[float], ways: list[str]) -> 
     assert [way for way, _ in found] == ways
 
 
+def test_a_waveform_that_the_scene_lacks_is_refused_before_its_runs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A surface of given motion has no ram: that was found after all points, which were left."""
+    over = ["optimal", "--over", "friction.mu_k=0.5,0.6", "--keep", "z_part,z_ram"]
+    assert main(["sweep", *over, "--out", str(tmp_path / "out")]) == 2
+    assert 'the runs have no "z_ram" (they have time, z_surface' in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["sweep", "ideal-current", "--set", "run.duration=0.1", "--workers", "2"]
     over = ["--over", "drive.offset=-2:0:3", "--over", "drive.amplitude=6,8"]

@@ -4,7 +4,7 @@ import os
 import time
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import nullcontext, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import xarray as xr
 
-from cosim.errors import BadInput, Note, plain
+from cosim.errors import BadInput, CosimError, Note, plain
 from cosim.evaluate.evaluator import Evaluator, workers_asked
 from cosim.evaluate.keys import refuse_unknown
 from cosim.evaluate.point import Number, Settings, moved
@@ -96,6 +96,8 @@ def sweep(
     known = {*UNITS, *(scene.circuit.save or ())}
     if not scene.port and (unknown := [name for name in kept if name not in known]):
         raise BadInput(f'--keep: no run has "{plain(unknown[0])}"{suggestion(unknown[0], known)}.')
+    if kept and (columns := _columns(scene, design)):  # before the first of many runs
+        _refuse_missing(kept, columns)
     with TemporaryDirectory() if out is None else nullcontext(out) as folder:
         data = _sweep(scene, design, Path(folder), kept, workers, dask, progress)
         if out is not None:
@@ -164,6 +166,24 @@ def _sweep(
         return data
 
 
+def _refuse_missing(names: Sequence[str], columns: Collection[str]) -> None:
+    if unknown := [name for name in names if name not in columns]:
+        known = ", ".join(columns)
+        raise BadInput(f'--keep: the runs have no "{plain(unknown[0])}" (they have {known}).')
+
+
+def _columns(scene: Scene, design: Design) -> Collection[str] | None:
+    """The waveforms of the first point's run, cut short; None where it fails."""
+    from cosim.simulation.simulate import simulate
+
+    with suppress(CosimError):
+        first = moved(scene, design.point(0), design.changes_frequency)
+        short = min(first.run.duration, 2.0 * first.run.output_step)
+        times = {"settle": 0.0, "duration": short, "average": "ends"}
+        return simulate(first.having(run=times)).columns
+    return None
+
+
 def _keep(
     folder: Path,
     scene: Scene,
@@ -179,9 +199,7 @@ def _keep(
     def kept(number: int) -> None:
         point = moved(scene, design.point(number), design.changes_frequency)
         result = simulate(point, progress)
-        if unknown := [name for name in names if name not in result.columns]:
-            known = ", ".join(result.columns)
-            raise BadInput(f'--keep: the runs have no "{plain(unknown[0])}" (they have {known}).')
+        _refuse_missing(names, result.columns)
         later = result.columns["time"] >= point.run.settle
         columns = {name: result.columns[name][later] for name in ("time", *names)}
         with whole(folder / f"{number}.nc") as temporary, temporary.open("wb") as file:
