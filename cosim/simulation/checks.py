@@ -59,8 +59,9 @@ hundredth of one."""
 
 HARDLY = 0.7
 """Share of a run's steps from which on those of its coarser run are hardly fewer: edges of the
-netlist's own sources rule them, and both runs err alike there. It takes a smaller tolerance to show
-this, which then costs few more steps."""
+netlist's own sources rule them, and both runs err alike there. A run shows this whose tolerance is
+smaller, and whose longest step is the mean step, since an FMU's lag grows with the step; where
+edges rule, that costs few more steps."""
 
 FAR = 0.05
 """Difference of a user's netlist in its coarser run, over v_average or a port's rms, from which on
@@ -194,13 +195,15 @@ def _judges(
     """The summaries whose differences to ``own`` tell the errors of the numbers in ``scales``, for
     a netlist of the user's. That is the one with all steps COARSER times as ``longer``. Where it is
     FAR off, in units of the scales, one with all steps as much shorter takes its place; where both
-    take HARDLY other steps, one of a smaller tolerance stands beside it."""
+    take HARDLY other steps, one of smaller tolerance and longest step stands beside it."""
     far = any(abs(own[name] - longer.get(name, own[name])) > FAR * scales[name] for name in scales)
     shorter = _longer(scene, 1.0 / COARSER)
     if far and shorter != _longer(scene, COARSER):
         return [_numbers(shorter, progress) or longer]
     if HARDLY < longer.get("circuit_steps", 0) / max(1, own["circuit_steps"]) < 1.0 / HARDLY:
-        sharper = scene.having(circuit={"reltol": scene.circuit.reltol / COARSER**3})
+        mean = scene.run.duration / max(1, own["circuit_steps"])
+        tighter = {"reltol": scene.circuit.reltol / COARSER**3, "max_step": mean}
+        sharper = scene.having(circuit=tighter)
         return [longer, *filter(None, [_numbers(sharper, progress)])]
     return [longer]
 
