@@ -184,6 +184,16 @@ def test_a_zero_but_for_rounding_asks_for_no_third_run(
     assert steps == [checks.COARSER * scene.circuit.max_step]
 
 
+def test_macro_steps_are_not_taken_for_ringing(tmp_path: Path) -> None:
+    """Their ends are ngspice's, too, and nothing else made its steps twenty times as many."""
+    build(tmp_path, "Load")
+    (tmp_path / "balanced.toml").write_text(BALANCED)
+    (tmp_path / "balanced.cir").write_text(BRIDGE)
+    macro = {"coupling.method": "macro-steps", "coupling.macro_step": 1e-6, "run.duration": 0.011}
+    found = simulate(load(tmp_path / "balanced.toml", macro)).summary
+    assert found["circuit_steps"] >= 11_000 and found["notes"] == []
+
+
 def test_the_table_of_what_another_run_leaves_out(tmp_path: Path) -> None:
     """An output that nothing reads, and that is no number in longer steps."""
     recompiled(tmp_path, ("m->r[D] * m->r[U]", "m->steps < 2.5e4 * m->time ? NAN : m->r[U]"))

@@ -165,9 +165,9 @@ def _numbers(settle: float, times: Array, values: Array, continuous: bool) -> di
 
 
 _OFTEN, _LONG, _WITHIN = 10, 10_000, 20
-"""Ringing is reported if the steps are so many times those that ``circuit.max_step`` asks for, and
-their number is above the second; a node within a subcircuit must ring the third times as much as
-a named one to be named."""
+"""Ringing is reported if the steps are so many times those that ``circuit.max_step``, or a shorter
+macro step, asks for, and their number is above the second; a node within a subcircuit must ring the
+third times as much as a named one to be named."""
 _SELDOM, _MANY = 2, 10
 """An FMU has steps of its own if its outputs change only every so manieth step or less often,
 judged from so many changes on."""
@@ -177,7 +177,10 @@ def _notes(run: Run, odd: list[str]) -> Iterator[str]:
     """Sentences on what ngspice told, ringing, values that are no numbers, outputs that repeated
     steps change, and FMUs with steps of their own; ``odd`` names signals that were left out."""
     yield from engine().remarks()
-    often = run.steps * run.plan.scene.circuit.max_step / run.state.duration
+    longest, key = run.plan.scene.circuit.max_step, "circuit.max_step"
+    if 0.0 < run.state.macro_step < longest:  # 0 without macro steps
+        longest, key = run.state.macro_step, "coupling.macro_step"
+    often = run.steps * longest / run.state.duration
     if often > _OFTEN and run.steps > _LONG:
         turns = {
             name: loop().ports_turns(k)
@@ -188,7 +191,7 @@ def _notes(run: Run, odd: list[str]) -> Iterator[str]:
         node = max(turns, key=lambda n: turns[n] if "." not in n else turns[n] / _WITHIN)
         called = re.sub(r"^v\(|_vmeas_\d+|\)$", "", node)  # of 7, where I is read
         yield (
-            f"the circuit took {run.steps} steps, {often:.0f} times as many as circuit.max_step "
+            f"the circuit took {run.steps} steps, {often:.0f} times as many as {key} "
             f"asks for. It turned most often, {turns[node]} times, at node {called}: if it rings "
             "there, damp it, say by a resistor and a capacitor to ground."
         )
