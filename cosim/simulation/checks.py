@@ -399,9 +399,10 @@ def _longer(scene: Scene, longer: float) -> Scene:
     """The scene with steps ``longer`` times as long, or as short where a scene does not allow such
     long ones: a run at the limit would err like the scene itself."""
     circuit = scene.circuit
+    whole = math.ceil(longer) if longer > 1.0 else longer  # an FMU may have steps of its own
     tables = {
         "circuit": {"reltol": circuit.reltol * longer**3, "max_step": circuit.max_step * longer},
-        "coupling": {"macro_step": scene.coupling.macro_step * longer},
+        "coupling": {"macro_step": scene.coupling.macro_step * whole},
     }
     pairs = ((KEYS[f"{table}.{name}"], x) for table in tables for name, x in tables[table].items())
     if longer > 1.0 and not all(key.holds(x) for key, x in pairs):

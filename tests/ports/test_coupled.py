@@ -808,6 +808,21 @@ def test_fixed_steps_take_macro_steps(tmp_path: Path) -> None:
     assert result.summary["method"] == "macro-steps" and result.summary["fmu_steps"] == 10
 
 
+@pytest.mark.checked
+def test_the_error_is_told_where_an_fmu_discards_other_steps(tmp_path: Path) -> None:
+    """It takes whole multiples of its own step: 3.5 of them failed, and no error was told."""
+    strict = "int a) { return fabs(h / 1e-4 - rint(h / 1e-4)) > 1e-6 ? 2 : ((void)a, step"
+    recompiled(
+        tmp_path, ("int a) { return (void)a, step", strict), ("(m, time, h); }", "(m, time, h)); }")
+    )
+    scene, true = motor(tmp_path, fixed=True), plain(tmp_path, 0.02)
+    found = cosim.run(scene, {"run.settle": 0.01}).summary
+    late = true["time"] >= 0.01
+    mean = np.trapezoid(true["omega"][late], true["time"][late]) / 0.01
+    assert found["method"] == "macro-steps"
+    assert abs(found["rotor.omega.mean"] - mean) < 2.0 * found["rotor.omega.mean_error"]
+
+
 FIXED = 'canHandleVariableCommunicationStepSize="false"'
 
 
