@@ -105,6 +105,12 @@ BAD = [
 ]
 
 
+def test_knobs_that_no_port_reads_are_refused() -> None:
+    """They were turned 30 times, and told as the best."""
+    with pytest.raises(BadInput, match=r'^scene dc-motor: .* from = "drive" it has no knobs; '):
+        tune("dc-motor", maximise="gear.speed.mean", budget=30)
+
+
 @pytest.mark.parametrize(("arguments", "words"), BAD)
 def test_bad_input(
     arguments: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

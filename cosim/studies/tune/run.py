@@ -115,11 +115,12 @@ def tune(
         raise scene.bad(f"{quantity} is not a number of its summary, {words}.")
     check_seed(seed)
     shaped = waveform or scene.drive.waveform in COMMANDS
-    if not over and not (shaped and scene.rung.driven):
+    unheard = scene.has_ports and scene.period == inf  # no port reads the drive
+    if not over and (unheard or not (shaped and scene.rung.driven)):
         key = "circuit.model" if shaped else "drive.waveform"
         still = scene.circuit.model if shaped else scene.drive.waveform
-        words = "has no knobs; name what to tune with --over table.key=low:high."
-        raise scene.bad(f'{key} = "{still}" {words}')
+        why = 'without a [[port]] from = "drive" it' if unheard else f'{key} = "{still}"'
+        raise scene.bad(f"{why} has no knobs; name what to tune with --over table.key=low:high.")
     keys = _checked(over or KNOBS)
     refuse_unknown(scene, keys)
     most = most_heat(scene, heat)
