@@ -304,6 +304,10 @@ def _with_levels(data: dict[str, Any]) -> dict[str, Any]:
     return data | {"table": table} if levels else data
 
 
+SECTION_SIGN = ("\u00a7", "_")
+"""LTspice's sign between a part's kind and its name, and what reading of netlists makes of it."""
+
+
 class Circuit(Table):
     """What turns V1 into current."""
 
@@ -348,6 +352,11 @@ class Circuit(Table):
     max_step: float = _number(
         1.4e-4, "s", 1e-9, 1e-2, "Largest step of ngspice; 2e-05 by default with file"
     )
+
+    @field_validator("save")
+    @classmethod
+    def _read(cls, words: list[str] | None) -> list[str] | None:
+        return words and [each.replace(*SECTION_SIGN) for each in words]
 
     @model_validator(mode="before")
     @classmethod
@@ -618,8 +627,7 @@ class Port(Table):
     @field_validator("source", "probe")
     @classmethod
     def _read(cls, name: str | None) -> str | None:
-        """Replace LTspice's § between a part's kind and its name, as reading of netlists does."""
-        return name and name.replace("\u00a7", "_")
+        return name and name.replace(*SECTION_SIGN)
 
     @property
     def words(self) -> str:

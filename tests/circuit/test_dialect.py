@@ -789,13 +789,15 @@ def test_words_of_other_programs_are_known(lines: str, tmp_path: Path) -> None:
 @needs.ngspice_library
 def test_a_port_may_have_the_sign_of_ltspice(tmp_path: Path) -> None:
     """§ stands between a part's kind and its name; and what lies beyond the run is no value."""
-    text = HEAD.replace("V1", "V§1") + ".meas late FIND V(in) AT 5m\n.end\n"
+    text = HEAD.replace("V1", "V§1") + "R§9 in 0 2\n.meas late FIND V(in) AT 5m\n.end\n"
     (tmp_path / "own.cir").write_text(text)
-    (tmp_path / "own.toml").write_text(SCENE.format('"v(in)"').replace('"V1"', '"V§1"'))
+    saved = SCENE.format('"v(in)", "I(R§9)"')
+    (tmp_path / "own.toml").write_text(saved.replace('"V1"', '"V§1"'))
     with in_place():
         result = cosim.run(tmp_path / "own.toml")
     true = np.sin(2e3 * np.pi * result.columns["time"])
     assert result.columns["v(in)"] == pytest.approx(true, abs=1e-3)
+    assert result.columns["I(R_9)"] == pytest.approx(true / 2.0, abs=1e-3)
     assert "meas.late" not in result.summary
 
 
