@@ -66,6 +66,21 @@ def test_a_sweep_is_written_and_read(tmp_path: Path, scene: Path) -> None:
     )
 
 
+def test_a_name_with_a_comma_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A wrong one is told before the points run."""
+    path, out = motor(tmp_path), tmp_path / "out"
+    path.write_text(path.read_text().replace('"v(gp)"', '"v(a,b)", "max(v(a),v(b))"'))
+    command = ["sweep", str(path), "--set", "run.duration=1e-3", "--over", "fmu.rotor.J=1e-4,2e-4"]
+    kept = ["v(a,b)", "rotor.omega", "max(v(a),v(b))"]
+    with in_place():
+        assert main([*command, "--keep", ",".join(kept), "--out", str(out)]) == 0
+    with netCDF4.Dataset(out / "points" / "0.nc") as file:
+        assert {*kept} <= {*file.variables}
+    assert main([*command, "--keep", "v(a,c)", "--out", str(tmp_path / "none")]) == 2
+    assert '"v(a,c)"; did you mean v(a,b)?' in capsys.readouterr().err
+    assert not (tmp_path / "none").exists()
+
+
 def test_names_that_netcdf_makes_one_stay_two(tmp_path: Path) -> None:
     scene, out = motor(tmp_path), tmp_path / "out"
     names = ('name="alpha"', 'name="a/b"'), ('name="y"', 'name="a|b"')

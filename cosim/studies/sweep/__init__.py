@@ -12,6 +12,18 @@ OVER = Option(
 )
 SAMPLES = "N settings from the ranges of the keys, a Latin hypercube, instead of the grid"
 
+
+def _parts(text: str) -> list[str]:
+    """The names between commas, but for those within brackets, as in v(a,b)."""
+    parts: list[str] = []
+    for part in text.split(","):
+        if parts and sum(map(parts[-1].count, "([")) > sum(map(parts[-1].count, ")]")):
+            parts[-1] += f",{part}"
+        else:
+            parts.append(part)
+    return parts
+
+
 STUDIES = (
     Study(
         "sweep.run.sweep",
@@ -22,7 +34,7 @@ STUDIES = (
             Option("--seed", "of the samples", "N", int, 0),
             Option(
                 *("--keep", "also keep these waveforms of every point"),
-                *("current,v_surface", lambda text: text.split(",")),
+                *("current,v_surface", _parts),
             ),
             *(WORKERS, DASK, SHOW),
         ),

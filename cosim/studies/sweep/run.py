@@ -20,6 +20,7 @@ from cosim.files.atomic import whole
 from cosim.mechanics import package as fmu
 from cosim.scene import Overrides, Scene, load
 from cosim.scene.messages import suggestion
+from cosim.scene.tables import MACHINE
 from cosim.simulation.checks import motion
 from cosim.studies.sweep import dataset
 from cosim.studies.sweep.design import Design, grid, sample
@@ -28,7 +29,7 @@ from cosim.toolchain.threads import threads
 from cosim.toolchain.versions import versions
 from cosim.typed import typed
 from cosim.waveforms.columns import UNITS
-from cosim.waveforms.report import motion_in_words, of_the_start
+from cosim.waveforms.report import asked_for, motion_in_words, of_the_start
 from cosim.waveforms.storage import netcdf
 
 STORE = "sweep.sqlite"
@@ -93,8 +94,12 @@ def sweep(
     if keep and out is None:
         raise BadInput("keep: waveforms are kept in a folder; name one as out.")
     kept = [keep] if isinstance(keep, str) else keep
-    known = {*UNITS, *(scene.circuit.save or ())}
-    if not scene.port and (unknown := [name for name in kept if name not in known]):
+    known, read_later = {*UNITS, *(scene.circuit.save or ())}, ()
+    if scene.has_ports:
+        known = asked_for(scene)
+        read_later = tuple(f"{name}." for name in (MACHINE, *(fmu.name for fmu in scene.fmu)))
+    unknown = [name for name in kept if name not in known and not name.startswith(read_later)]
+    if unknown:
         raise BadInput(f'--keep: no run has "{plain(unknown[0])}"{suggestion(unknown[0], known)}.')
     if kept and (columns := _columns(scene, design)):  # before the first of many runs
         _refuse_missing(kept, columns)
