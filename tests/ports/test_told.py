@@ -184,6 +184,17 @@ def test_a_zero_but_for_rounding_asks_for_no_third_run(
     assert steps == [checks.COARSER * scene.circuit.max_step]
 
 
+@pytest.mark.parametrize("rows", [2e-5, 2e-6])
+def test_a_chopper_as_fast_as_the_rows_is_told(tmp_path: Path, rows: float) -> None:
+    """Rows as far apart as its period show what it chops as if it stood."""
+    build(tmp_path, "Load", through=True)
+    (tmp_path / "chopper.cir").write_text(CHOPPER)
+    (tmp_path / "chopper.toml").write_text(CHOPPED.replace("step-locked", "redo"))
+    found = simulate(load(tmp_path / "chopper.toml", {"run.output_step": rows})).summary
+    told = [note for note in found["notes"] if "changes faster than the rows" in note]
+    assert [note.startswith("Vf, i(Vf) changes") for note in told] == [True] * (rows > 1e-5)
+
+
 def test_macro_steps_are_not_taken_for_ringing(tmp_path: Path) -> None:
     """Their ends are ngspice's, too, and nothing else made its steps twenty times as many."""
     build(tmp_path, "Load")

@@ -10,7 +10,7 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.circuit.joined import unit
 from cosim.circuit.outputs import measured
-from cosim.coupling.loop.agenda import count
+from cosim.coupling.loop.agenda import HIDDEN, count, folded, grid
 from cosim.coupling.loop.lead import engine
 from cosim.coupling.loop.structures import loop
 from cosim.coupling.ports.run import Run
@@ -50,6 +50,8 @@ def joined(
     }
     log = run.log.array()
     known = {w: log[:, 1 + len(run.plan.names) + k] for k, w in enumerate(run.deck.vectors)}
+    asked = {*run.plan.names, *run.plan.words}
+    of_circuit = {name: values for name, _, _, values, _ in signals if name in asked}
     values, without = measured(run.deck.measures, log[:, 0], known)
     summary |= values
     length = scene.run.duration - scene.run.settle
@@ -67,6 +69,11 @@ def joined(
         "notes": [
             *(*run.deck.notes, *run.plan.notes, *run.plan.late_notes()),
             *(*_notes(run, odd), *without),
+            *folded(
+                {"time": log[:, 0], **of_circuit},
+                {name: (name,) for name in of_circuit},
+                *(grid(step, scene.run.duration), scene.run, HIDDEN),
+            ),
         ],
     }
     return columns, summary, units

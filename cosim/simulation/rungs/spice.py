@@ -2,12 +2,12 @@
 
 from collections.abc import Iterator
 from contextlib import closing
-from itertools import chain
 
 import numpy as np
 
 from cosim.arrays import Array
 from cosim.circuit.netlist import AT_WORK, AT_WORK_HERE, OWN
+from cosim.coupling.loop.agenda import FOLDED, folded
 from cosim.coupling.loop.recorder import Recorder
 from cosim.drive.command import command
 from cosim.drive.pieces import Command
@@ -36,7 +36,9 @@ def drive(scene: Scene, recorder: Recorder) -> Driven:
         known = {word.removeprefix(OWN): log[word] for word in log if word.startswith(OWN)}
         values, without = measured(lead.deck.measures, log["time"], known)
         notes += [*lead.deck.notes, *without, *engine().remarks()]
-        notes += _folded(scene, log, recorder.time)
+        names = {"coil_voltage": ("v(out)", "v(sense)")}
+        names |= {word: (OWN + word,) for word in scene.circuit.save or []}
+        notes += folded(log, names, recorder.time, scene.run, FOLDED)
     electric, waves = _electrics(scene, command(scene), log, recorder.time)
     return Driven(
         electric,
@@ -115,34 +117,6 @@ def _electrics(
         "coil_voltage": waves.column(1),
         **{name: waves.column(2 + k) for k, name in enumerate(saved)},
     }
-
-
-FOLDED = 0.2
-"""Rms error of interpolated rows, over the waveform's rms, above which a note is given."""
-
-
-def _folded(scene: Scene, log: dict[str, Array], rows: Array) -> Iterator[str]:
-    """A note on waveforms faster than their rows: a carrier at the rows' rate looks constant."""
-    names = {"coil_voltage": ("v(out)", "v(sense)")}
-    names |= {word: (OWN + word,) for word in scene.circuit.save or []}
-    missed, whole = np.zeros((2, len(names)))
-    for part in _points({x: log[x] for x in {"time", *chain(*names.values())}}):
-        time = part["time"]
-        inside = rows[rows.searchsorted(time[0]) : rows.searchsorted(time[-1], "right")]
-        if len(inside) < 2:
-            continue
-        h = np.where(time[1:] > scene.run.settle, np.diff(time), 0.0)
-        for k, (vector, *less) in enumerate(names.values()):
-            y = part[vector] - sum(part[other] for other in less)
-            back = np.interp(time, inside, np.interp(inside, time, y))
-            missed[k] += total(h, (y - back)[1:] ** 2)
-            whole[k] += total(h, y[1:] ** 2)
-    if odd := [name for k, name in enumerate(names) if missed[k] > FOLDED**2 * whole[k]]:
-        yield (
-            f"{', '.join(odd)} changes faster than the rows of the waveforms, which are "
-            f"{scene.run.output_step:g} s apart (run.output_step): a PWM looks slow there and in "
-            "the figure. The numbers of the summary are of every step."
-        )
 
 
 def _limited(scene: Scene, log: dict[str, Array]) -> dict[str, float]:
