@@ -176,6 +176,9 @@ def checked_ports(scene: Scene, run: Callable[[], Result], progress: Progress) -
         told = _judges(scene, own, other.result(), scales, progress)
     errors = _errors(own, told, (name for name in own if name.endswith(".mean")), LEAST_TOLD)
     found: dict[str, Any] = {f"{name}_error": errors[name] for name in errors}
+    if not any(told):
+        words = "the errors of the means are not known: the runs with other steps for them fail."
+        found["notes"] = [*own["notes"], words]
     worst = max(scales, key=lambda name: errors.get(name, 0.0) / scales[name], default="")
     if errors.get(worst, 0.0) > FAR * scales.get(worst, 0.0):
         name = worst.removesuffix(".mean")
@@ -193,10 +196,12 @@ def _judges(
     progress: Progress,
 ) -> list[dict[str, Any]]:
     """The summaries whose differences to ``own`` tell the errors of the numbers in ``scales``, for
-    a netlist of the user's. That is the one with all steps COARSER times as ``longer``. Where it is
-    FAR off, in units of the scales, one with all steps as much shorter takes its place; where both
-    take HARDLY other steps, one of smaller tolerance and longest step stands beside it."""
-    far = any(abs(own[name] - longer.get(name, own[name])) > FAR * scales[name] for name in scales)
+    a netlist of the user's. That is the one with all steps COARSER times as ``longer``. Where it
+    fails, or is FAR off in units of the scales, one with all steps as much shorter takes its place;
+    where both take HARDLY other steps, one of smaller tolerance and longest step stands beside."""
+    far = not longer or any(
+        abs(own[name] - longer.get(name, own[name])) > FAR * scales[name] for name in scales
+    )
     shorter = _longer(scene, 1.0 / COARSER)
     if far and shorter != _longer(scene, COARSER):
         return [_numbers(shorter, progress) or longer]

@@ -809,18 +809,32 @@ def test_fixed_steps_take_macro_steps(tmp_path: Path) -> None:
 
 
 @pytest.mark.checked
-def test_the_error_is_told_where_an_fmu_discards_other_steps(tmp_path: Path) -> None:
-    """It takes whole multiples of its own step: 3.5 of them failed, and no error was told."""
-    strict = "int a) { return fabs(h / 1e-4 - rint(h / 1e-4)) > 1e-6 ? 2 : ((void)a, step"
-    recompiled(
-        tmp_path, ("int a) { return (void)a, step", strict), ("(m, time, h); }", "(m, time, h)); }")
-    )
-    scene, true = motor(tmp_path, fixed=True), plain(tmp_path, 0.02)
+@pytest.mark.parametrize(
+    ("fixed", "refused"), [(True, "fabs(h / 1e-4 - rint(h / 1e-4)) > 1e-6"), (False, "h > 1e-5")]
+)
+def test_the_error_is_told_where_an_fmu_discards_other_steps(
+    tmp_path: Path, fixed: bool, refused: str
+) -> None:
+    """It takes whole multiples of its own step: 3.5 of them failed, and no error was told; or none
+    as long as those of the second run, so shorter ones tell it."""
+    strict = f"int a) {{ return {refused} ? 2 : ((void)a, step"
+    ended = ("(m, time, h); }", "(m, time, h)); }")
+    recompiled(tmp_path, ("int a) { return (void)a, step", strict), ended)
+    scene, true = motor(tmp_path, fixed=fixed), plain(tmp_path, 0.02)
     found = cosim.run(scene, {"run.settle": 0.01}).summary
     late = true["time"] >= 0.01
     mean = np.trapezoid(true["omega"][late], true["time"][late]) / 0.01
-    assert found["method"] == "macro-steps"
+    assert found["method"] == ("macro-steps" if fixed else "step-locked")
     assert abs(found["rotor.omega.mean"] - mean) < 2.0 * found["rotor.omega.mean_error"]
+
+
+@pytest.mark.checked
+def test_errors_that_no_other_run_shows_are_told_as_not_known(tmp_path: Path) -> None:
+    strict = ("int a) { return (void)a, step", "int a) { return h != 1e-4 ? 2 : ((void)a, step")
+    recompiled(tmp_path, strict, ("(m, time, h); }", "(m, time, h)); }"))
+    found = cosim.run(motor(tmp_path, fixed=True), {"run.duration": 2e-3}).summary
+    assert not any(name.endswith("_error") for name in found)
+    assert "errors of the means are not known" in found["notes"][-1]
 
 
 FIXED = 'canHandleVariableCommunicationStepSize="false"'
