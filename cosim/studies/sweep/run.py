@@ -20,7 +20,6 @@ from cosim.files.atomic import whole
 from cosim.mechanics import package as fmu
 from cosim.scene import Overrides, Scene, load
 from cosim.scene.messages import suggestion
-from cosim.scene.tables import MACHINE
 from cosim.simulation.checks import motion
 from cosim.studies.sweep import dataset
 from cosim.studies.sweep.design import Design, grid, sample
@@ -28,8 +27,7 @@ from cosim.studies.sweep.report import MOTION, MOTIONS, fastest
 from cosim.toolchain.threads import threads
 from cosim.toolchain.versions import versions
 from cosim.typed import typed
-from cosim.waveforms.columns import UNITS
-from cosim.waveforms.report import asked_for, motion_in_words, of_the_start
+from cosim.waveforms.report import motion_in_words, of_the_start
 from cosim.waveforms.storage import netcdf
 
 STORE = "sweep.sqlite"
@@ -94,13 +92,6 @@ def sweep(
     if keep and out is None:
         raise BadInput("keep: waveforms are kept in a folder; name one as out.")
     kept = [keep] if isinstance(keep, str) else keep
-    known, read_later = {*UNITS, *(scene.circuit.save or ())}, ()
-    if scene.has_ports:
-        known = asked_for(scene)
-        read_later = tuple(f"{name}." for name in (MACHINE, *(fmu.name for fmu in scene.fmu)))
-    unknown = [name for name in kept if name not in known and not name.startswith(read_later)]
-    if unknown:
-        raise BadInput(f'--keep: no run has "{plain(unknown[0])}"{suggestion(unknown[0], known)}.')
     if kept and (columns := _columns(scene, design)):  # before the first of many runs
         _refuse_missing(kept, columns)
     with TemporaryDirectory() if out is None else nullcontext(out) as folder:
@@ -173,8 +164,8 @@ def _sweep(
 
 def _refuse_missing(names: Sequence[str], columns: Collection[str]) -> None:
     if unknown := [name for name in names if name not in columns]:
-        known = ", ".join(columns)
-        raise BadInput(f'--keep: the runs have no "{plain(unknown[0])}" (they have {known}).')
+        hint = f"{suggestion(unknown[0], columns)} (they have {', '.join(columns)})"
+        raise BadInput(f'--keep: the runs have no "{plain(unknown[0])}"{hint}.')
 
 
 def _columns(scene: Scene, design: Design) -> Collection[str] | None:
