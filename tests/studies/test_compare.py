@@ -169,6 +169,19 @@ def test_frequencies_that_differ_are_told(run: cosim.Result, tmp_path: Path) -> 
     assert told in repr(compared)
 
 
+def test_motion_that_repeats_after_two_periods_is_driven_alike(
+    run: cosim.Result, tmp_path: Path
+) -> None:
+    """A subharmonic, as of every second impact, is at half of the drive's frequency, not apart."""
+    time = np.arange(400) / 1000.0
+    z = MM * heights(run, time, "surface") + 0.8 * np.sin(2 * np.pi * 10.0 * time)
+    compared = cosim.compare(run, write(tmp_path / "a.csv", "time [s],surface [mm]", time, z))
+    assert compared.numbers["frequency_measured"] == pytest.approx(10.0, rel=2e-3)
+    said = " ".join(compared.found.notes)
+    assert "frequencies differ" not in said
+    assert "repeats at 10 Hz, after 2 periods of the run's drive" in said
+
+
 # --- scores -------------------------------------------------------------------
 
 

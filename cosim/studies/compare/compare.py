@@ -40,6 +40,9 @@ APART = 0.05
 """Share of a period by which run and recording may drift apart before a note says so."""
 
 
+MOST_PERIODS = 8
+"""Periods of the drive after which motion may repeat, at most; times by ten are a unit's error."""
+
 STILL = 0.1
 """A signal of less than this share of its 95 % quantile counts as at rest."""
 
@@ -221,6 +224,16 @@ def _of_periods(
     """Notes on the periods (s) of a recording of length ``span`` and of the run."""
     if repeats is None:
         yield "The recording does not repeat: there is no ceiling, and no whole period."
+    elif (
+        period
+        and 2 <= (each := round(repeats / period)) <= MOST_PERIODS
+        and abs(each / repeats - 1.0 / period) * span <= APART
+    ):
+        yield (
+            f"The recording repeats at {1.0 / repeats:.4g} Hz, after {each} periods of the run's "
+            f"drive: so may motion that is driven at {1.0 / period:.4g} Hz. If it was not, "
+            "drive.frequency or the times' unit is wrong, which spoils the scores."
+        )
     elif (
         period and (apart := abs(1.0 / repeats - 1.0 / period) * span) > APART + 0.5 * row / repeats
     ):
