@@ -13,6 +13,7 @@ from scipy.optimize import minimize_scalar
 
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
+from cosim.simulation.checks import MOST_PERIODS
 from cosim.studies.compare.hints import hints
 from cosim.studies.compare.scores import R2, Number, Signals, both_sides, explained, scores
 from cosim.studies.report import Row
@@ -38,10 +39,6 @@ LEAST_ROWS = 8
 
 APART = 0.05
 """Share of a period by which run and recording may drift apart before a note says so."""
-
-
-MOST_PERIODS = 8
-"""Periods of the drive after which motion may repeat, at most; times by ten are a unit's error."""
 
 STILL = 0.1
 """A signal of less than this share of its 95 % quantile counts as at rest."""
