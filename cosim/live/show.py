@@ -146,8 +146,10 @@ def _sweep(folder: Path) -> tuple[dict[str, Any], list[Run]]:
 def _table(path: Path) -> tuple[dict[str, Any], list[Run]]:
     """Curves of a table whose first column is time; else a cloud, and a chart's pictures."""
     cells = read_cells(path)
-    cells.even(1)
     header, heads = [*cells.rows[0][1]], {}
+    if not any(header):
+        raise BadInput(f"{cells.name}: row {cells.rows[0][0]}: the header is empty.")
+    cells.even(1)
     while not header[-1]:  # a separator too many
         header.pop()
     for cell in header:

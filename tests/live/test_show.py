@@ -245,6 +245,7 @@ def test_what_cannot_be_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     (tmp_path / "head.csv").write_text("time [s],v [m/s]\n", encoding="utf-8")
     (tmp_path / "gone.csv").write_text("time [s],v [m/s]\n0,1\n,2\n2,3\n", encoding="utf-8")
     (tmp_path / "twice.csv").write_text("time [s],z [m],z [m]\n0,1,2\n1,2,3\n", encoding="utf-8")
+    (tmp_path / "blank.csv").write_text("\n;;\n;;\n", encoding="utf-8")
     (tmp_path / "half").mkdir()
     (tmp_path / "half" / "waveforms.nc").write_bytes(b"CDF\x01")
     for name, said in (
@@ -257,6 +258,7 @@ def test_what_cannot_be_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]
         ("head.csv", "curves need two rows"),
         ("gone.csv", "row 3, column time"),
         ("twice.csv", "two columns are called z [m]"),
+        ("blank.csv", "row 2: the header is empty"),
         ("half", "not a whole"),
         ("nothing", "nothing"),
     ):
