@@ -464,6 +464,28 @@ def test_a_map_tells_what_its_black_lines_and_dashes_are(
     assert (len(drawn.axes[0].collections) > 1) == told
 
 
+@pytest.mark.parametrize(
+    ("values", "ends"),
+    [([1e5, 1e6, 1e7], [4.5, 7.5]), ([100.0, 200.0, 300.0], None), ([-2.0, 1.0, 4e3], None)],
+)
+def test_values_that_go_up_by_ratios_stand_at_equal_distances(
+    values: list[float], ends: list[float] | None
+) -> None:
+    """On curves and on maps, whose cells reach half a ratio beyond the outer ones."""
+    keys = {"a": values, "b": [1.0, 2.0]}
+    about = {name: (name, at, {"key": f"t.{name}", "units": "?"}) for name, at in keys.items()}
+    v, failure = np.arange(6.0).reshape(3, 2), np.full((3, 2), "")
+    data = xr.Dataset(
+        {"v_average": (tuple(keys), v), "failure": (tuple(keys), failure)}, about, {"title": "x"}
+    )
+    scale = "log" if ends else "linear"
+    assert figure.draw(data.isel(b=[0]), "curve").axes[0].get_xscale() == scale
+    drawn = figure.draw(data, "map").axes[0]
+    assert (drawn.get_xscale(), drawn.get_yscale()) == ("linear", scale)
+    if ends is not None:
+        np.testing.assert_allclose(np.log10(drawn.get_ylim()), ends, atol=1e-9)
+
+
 def test_a_kill_leaves_no_older_figure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Between the numbers and the figure of another sweep, whose journal is gone."""
     (tmp_path / "figure.png").write_bytes(b"old")

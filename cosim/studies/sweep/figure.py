@@ -22,6 +22,9 @@ from cosim.waveforms.storage import swept
 STAYS = 0.05e-3
 """m/s; a part that moves more slowly than this counts as not transported."""
 
+WIDE = 20.0
+"""Ratio of a key's greatest and least value from which on its axis may be logarithmic."""
+
 MOST = 6
 """Most panels of a figure."""
 
@@ -138,7 +141,7 @@ def _maps(data: xr.Dataset, y: str, x: str, quantities: Sequence[Quantity]) -> P
     for axis, quantity in zip(axes, quantities, strict=True):
         axis.grid(False)
         values = _values(data, quantity).values
-        shown = axis.pcolormesh(xs, ys, values, shading="nearest")
+        shown = axis.pcolormesh(_borders(xs), _borders(ys), values)
         if quantity is V_AVERAGE:
             known = values[np.isfinite(values)]
             ends = known.min(initial=-STAYS), known.max(initial=STAYS)
@@ -150,6 +153,20 @@ def _maps(data: xr.Dataset, y: str, x: str, quantities: Sequence[Quantity]) -> P
         _name(axis.xaxis, data[x])
         _name(axis.yaxis, data[y])
     return figure
+
+
+def _by_ratios(values: Array) -> bool:
+    """Whether a key's values go up by ratios, over decades."""
+    low, middle, high = np.quantile(values, [0.0, 0.5, 1.0])
+    return bool(0.0 < low < high / WIDE and middle**2 < 2.0 * low * high)
+
+
+def _borders(values: Array) -> Array:
+    """The borders of the cells of a map: the middles between values, as the axis shows them."""
+    x = np.log(values) if _by_ratios(values) else values
+    half = np.diff(x) / 2.0
+    borders = np.concatenate([x[:1] - half[:1], x[:-1] + half, x[-1:] + half[-1:]])
+    return np.exp(borders) if _by_ratios(values) else borders
 
 
 def _boundary(axis: Axes, xs: Array, ys: Array, v: Array) -> None:
@@ -177,8 +194,12 @@ def _setting(value: xr.DataArray) -> str:
 
 
 def _name(axis: Axis, key: xr.DataArray) -> None:
-    """Label an axis; below each tick of a knob stands the frequency or amplitude that it sets."""
+    """Label an axis, which is logarithmic where values go up by ratios; below each tick of a knob
+    stands the frequency or amplitude that it sets."""
     axis.set_label_text(label(key.key, key.units))
+    if _by_ratios(key.values):
+        of = axis.axes
+        (of.set_xscale if axis is of.xaxis else of.set_yscale)("log")
     meaning, unit = _MEANT.get(key.key, (None, ""))
     if meaning:
         axis.set_major_locator(MaxNLocator(5))
