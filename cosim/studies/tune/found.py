@@ -254,9 +254,9 @@ class Tuning(Aim):
             lines.append(f"  {words}")
         if words := motion_in_words(self.motion):
             lines.append(f"  motion: {words}")
-        early = of_the_start(self.scene, {**self.best.outcome.numbers, **self.motion})
-        if early and self.quantity == "v_average":
-            lines.append(f"  {early}")
+        if self.quantity == "v_average":
+            early = of_the_start(self.scene, {**self.best.outcome.numbers, **self.motion})
+            lines += [f"  {early}"] * bool(early)
         if self.turned:
             lines.append(
                 f"  values are medians over the keys' turns by {percent(TURN)}, or the worst of "
