@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 
 from cosim.arrays import Array
+from cosim.circuit.folded import ROUNDED
 from cosim.errors import BadInput, CosimError, plain
 from cosim.mechanics.fmi import load
 from cosim.mechanics.normal_force import normal_force
@@ -67,10 +68,6 @@ FAR = 0.05
 """Difference of a user's netlist in its coarser run, over v_average or a port's rms, from which on
 that run tells nothing: its steps pass over what the circuit does, as a smooth comparator between
 two edges of its carrier, and the scene's own may, too."""
-
-ROUNDED = 1e-12
-"""Least scale of a port's mean, SI, as ngspice's abstol for currents: less is rounding, as of the
-voltage across a balanced bridge, and differs from run to run."""
 
 WRONG = 0.2
 """Twice the error of v_average, relative, above which a note says what to do."""

@@ -123,8 +123,8 @@ def chopped(drop: float) -> dict[str, float]:
 
 def test_a_lag_between_edges_is_told(tmp_path: Path) -> None:
     """A resistor as an FMU that saves no state, in a current that switches chop: the circuit learns
-    of its voltage a step late, and edges rule the steps of all runs alike. Less than a
-    third to a half of the error was told."""
+    of its voltage a step late, and edges rule the steps of all runs alike. Less than half of the
+    error was told."""
     build(tmp_path, "Load", saves=False, through=True)
     (tmp_path / "chopper.cir").write_text(CHOPPER)
     (tmp_path / "chopper.toml").write_text(CHOPPED)

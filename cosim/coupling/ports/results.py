@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from cosim.arrays import Array
+from cosim.circuit.folded import HIDDEN, folded
 from cosim.circuit.joined import unit
 from cosim.circuit.outputs import measured
-from cosim.coupling.loop.agenda import HIDDEN, count, folded, grid
+from cosim.coupling.loop.agenda import count, grid
 from cosim.coupling.loop.lead import engine
 from cosim.coupling.loop.structures import loop
 from cosim.coupling.ports.run import Run

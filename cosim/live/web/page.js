@@ -65,8 +65,8 @@ function fault(text) { $("fault").textContent = text; }
 
 // --- what is turned -------------------------------------------------------------------------------
 function take(setting, again) {
-  const before = state.setting, values = valuesOf(setting), setup = setupOf(values, setting.scene);
-  if (impossible(values)) return fault(impossible(values));
+  const before = state.setting, values = valuesOf(setting), setup = setupOf(values, setting.scene), wrong = impossible(values);
+  if (wrong) return fault(wrong);
   const was = setupOf(state.values, before.scene);
   Object.assign(state, { setting, values, grip: again ? 2 : state.grip });
   state.others = state.others.filter((other) => other === record);

@@ -6,8 +6,8 @@ from contextlib import closing
 import numpy as np
 
 from cosim.arrays import Array
+from cosim.circuit.folded import FOLDED, folded
 from cosim.circuit.netlist import AT_WORK, AT_WORK_HERE, OWN
-from cosim.coupling.loop.agenda import FOLDED, folded
 from cosim.coupling.loop.recorder import Recorder
 from cosim.drive.command import command
 from cosim.drive.pieces import Command

@@ -163,10 +163,11 @@ def _by_ratios(values: Array) -> bool:
 
 def _borders(values: Array) -> Array:
     """The borders of the cells of a map: the middles between values, as the axis shows them."""
-    x = np.log(values) if _by_ratios(values) else values
+    ratios = _by_ratios(values)
+    x = np.log(values) if ratios else values
     half = np.diff(x) / 2.0
     borders = np.concatenate([x[:1] - half[:1], x[:-1] + half, x[-1:] + half[-1:]])
-    return np.exp(borders) if _by_ratios(values) else borders
+    return np.exp(borders) if ratios else borders
 
 
 def _boundary(axis: Axes, xs: Array, ys: Array, v: Array) -> None:
